@@ -1,0 +1,39 @@
+"""The reference a controller tracks and its memory (paper's r, and the integrals of eqs. 10, 11, 14, 15)."""
+
+from typing import NamedTuple
+
+from hydrone_gym._jit import inlined
+
+
+class Reference(NamedTuple):
+    """Where the controller should be now, and how fast that point moves."""
+
+    x: float  # m
+    y: float
+    z: float
+    psi: float  # rad
+    vx: float  # m/s
+    vy: float
+    vz: float
+
+
+class Integral(NamedTuple):
+    """Controller memory: integral contributions already in output units (rpm in air, N in water), zero at a crossing."""
+
+    z: float
+    phi: float
+    theta: float
+    psi: float
+
+
+@inlined
+def clamp(value, low, high):
+    """Limit a value to [low, high]; NaN passes through."""
+    value = low if value < low else value
+    return high if value > high else value
+
+
+@inlined
+def accumulate(integral, gain, error, limit, dt):
+    """Advance one integral contribution, clamped: anti-windup."""
+    return clamp(integral + gain * error * dt, -limit, limit)

@@ -1,0 +1,1 @@
+"""hydrone_gym.physics."""

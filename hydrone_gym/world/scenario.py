@@ -1,0 +1,193 @@
+"""A scenario: where a flight starts, where it should end, and the spheres in between; its rules and its JSON file."""
+
+import json
+import math
+import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from hydrone_gym.world.world import World
+
+FORMAT = "hydrone_gym scenario"
+VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scenario:
+    """One mission in a world of spheres.
+
+    Attributes:
+        start: x, y, z in m and yaw in rad at which the vehicle starts at rest.
+        goal: x, y, z in m.
+        obstacles: (M, 4) read-only float64 array, a sphere [x, y, z, r] in m a row; any nested sequence is copied.
+        name: what to call it in tables; counts as part of the value.
+
+    Scenarios are equal by value and hashable. Only shapes are checked here, see `validate` for the rules of a world.
+
+    Raises:
+        ValueError: a field of the wrong shape or with entries that are no numbers.
+    """
+
+    start: tuple[float, float, float, float]
+    goal: tuple[float, float, float]
+    obstacles: np.ndarray
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Bring every field to its one form: tuples of float, and an own read-only array."""
+        object.__setattr__(self, "start", _numbers("start", self.start, 4))
+        object.__setattr__(self, "goal", _numbers("goal", self.goal, 3))
+        try:
+            obstacles = np.array(self.obstacles, dtype=np.float64, order="C")
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"Scenario.obstacles must hold four numbers (m) a row: {error}") from None
+        if obstacles.size == 0:
+            obstacles = obstacles.reshape(0, 4)
+        if obstacles.ndim != 2 or obstacles.shape[1] != 4:
+            raise ValueError(f"Scenario.obstacles must have shape (M, 4) (m), got {obstacles.shape}")
+        obstacles.flags.writeable = False
+        object.__setattr__(self, "obstacles", obstacles)
+        if not isinstance(self.name, str):
+            raise ValueError(f"Scenario.name must be a string, got {self.name!r}")
+
+    @property
+    def media(self) -> tuple[str, str]:
+        """Medium of the start and of the goal, "air" or "water"."""
+        return "water" if self.start[2] < 0.0 else "air", "water" if self.goal[2] < 0.0 else "air"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        same_ends = self.start == other.start and self.goal == other.goal and self.name == other.name
+        return same_ends and np.array_equal(self.obstacles, other.obstacles)
+
+    def __hash__(self) -> int:
+        return hash((self.start, self.goal, self.name, len(self.obstacles)))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore after pickling or copying, which forget that the array is read-only."""
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
+        self.obstacles.flags.writeable = False
+
+
+def _numbers(name: str, value: Any, length: int) -> tuple[Any, ...]:
+    """Turn a sequence of numbers into a tuple of float."""
+    try:
+        numbers = tuple(map(float, value))
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) != length:
+        unit = "x, y, z in m and yaw in rad" if length == 4 else "x, y, z in m"
+        raise ValueError(f"Scenario.{name} must hold {length} numbers ({unit}), got {value!r}")
+    return numbers
+
+
+def check_end(name: str, position: tuple[float, ...], world: World) -> None:
+    """Raise ValueError unless a start or goal (x, y, z in m) lies inside the box and outside the transition zone."""
+    for axis, value, low, high in zip("xyz", position, world.lower, world.upper, strict=True):
+        if not low < value < high:  # NaN too
+            raise ValueError(f"{name} {axis} must lie inside the box, between {low!r} and {high!r} m, got {value!r} m")
+    if abs(position[2]) <= world.zone:
+        raise ValueError(f"{name} z must lie outside the transition zone of +-{world.zone!r} m, got {position[2]!r} m")
+
+
+def check_radius(vehicle_radius: float) -> None:
+    """Raise ValueError unless the vehicle's radius (m) is finite and positive."""
+    if not (math.isfinite(vehicle_radius) and vehicle_radius > 0.0):
+        raise ValueError(f"vehicle radius must be positive (m), got {vehicle_radius!r}")
+
+
+def validate(scenario: Scenario, world: World, vehicle_radius: float) -> None:
+    """Check that a vehicle of this radius (m) can start in the scenario and rest at its goal.
+
+    Raises ValueError naming the thing, the rule, the unit and the value when an end lies outside the box, inside the
+    transition zone or too near a sphere, or when a number is not finite or a sphere's radius is not positive.
+    """
+    check_radius(vehicle_radius)
+    check_end("start", scenario.start[:3], world)
+    check_end("goal", scenario.goal, world)
+    if not math.isfinite(scenario.start[3]):
+        raise ValueError(f"start yaw must be finite (rad), got {scenario.start[3]!r}")
+    obstacles = scenario.obstacles
+    for index in np.flatnonzero(~np.isfinite(obstacles).all(axis=1)):
+        raise ValueError(f"obstacle {index} must have finite numbers (m), got {obstacles[index].tolist()!r}")
+    for index in np.flatnonzero(obstacles[:, 3] <= 0.0):
+        raise ValueError(f"obstacle {index} must have a positive radius (m), got {obstacles[index, 3].item()!r}")
+    for name, position in (("start", scenario.start[:3]), ("goal", scenario.goal)):
+        clearance = np.linalg.norm(obstacles[:, :3] - position, axis=1) - obstacles[:, 3] - vehicle_radius
+        for index in np.flatnonzero(clearance <= 0.0):
+            raise ValueError(
+                f"{name} must keep more than the vehicle's radius of {vehicle_radius!r} m to the surface of "
+                f"obstacle {index}, got a clearance of {clearance[index]:.3g} m"
+            )
+
+
+def save_scenario(scenario: Scenario, path: str | Path) -> None:
+    """Write a scenario to a JSON file; every float is restored bit for bit by `load_scenario`.
+
+    Raises ValueError naming the path for a number that is not finite, and OSError when the file cannot be written.
+    """
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": scenario.name,
+        "start": scenario.start,
+        "goal": scenario.goal,
+        "obstacles": scenario.obstacles.tolist(),
+    }
+    try:
+        text = json.dumps(content, indent=1, allow_nan=False)
+    except ValueError:
+        raise ValueError(f"{path}: a scenario with numbers that are not finite cannot be saved") from None
+    Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario that `save_scenario` wrote.
+
+    Raises ValueError naming the path and the problem for anything else, and OSError when the file cannot be read.
+    """
+    try:
+        return _parse(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _parse(text: str) -> Scenario:
+    """Turn the text of a scenario file into a scenario; ValueError says what is wrong."""
+    try:
+        content = json.loads(text, parse_constant=_reject_constant)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"not complete JSON: {error}") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ValueError(f'not a scenario file: "format" must be "{FORMAT}"')
+    if content.get("version") != VERSION:
+        raise ValueError(f'"version" must be {VERSION}, got {content.get("version")!r}')
+    known = {"format", "version", *(spec.name for spec in fields(Scenario))}
+    for problem, keys in (("missing", known - content.keys()), ("unknown", content.keys() - known)):
+        if keys:
+            raise ValueError(f"{problem} key {', '.join(map(repr, sorted(keys)))}")
+    _check_row("start", content["start"], 4)
+    _check_row("goal", content["goal"], 3)
+    if not isinstance(content["obstacles"], list):
+        raise ValueError(f"obstacles must be a list, got {content['obstacles']!r}")
+    for index, row in enumerate(content["obstacles"]):
+        _check_row(f"obstacle {index}", row, 4)
+    return Scenario(**{key: content[key] for key in known - {"format", "version"}})
+
+
+def _check_row(name: str, row: Any, length: int) -> None:
+    """Raise ValueError unless a value read from JSON is a list of so many finite numbers."""
+    numbers = isinstance(row, list) and len(row) == length and all(type(entry) in (int, float) for entry in row)
+    # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
+    if not numbers or not all(abs(entry) <= sys.float_info.max for entry in row):
+        raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
+
+
+def _reject_constant(constant: str) -> NoReturn:
+    """Refuse the NaN and Infinity that JSON does not have but Python reads."""
+    raise ValueError(f"numbers must be finite, got {constant}")

@@ -1,0 +1,96 @@
+"""The world: bounds, water surface, transition zone, sensing and what counts as arrival or as a rough crossing."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class WorldParams(NamedTuple):
+    """`World` as the kernels read it."""
+
+    x_min: float
+    y_min: float
+    z_min: float
+    x_max: float
+    y_max: float
+    z_max: float
+    zone: float
+    sensor_range: float
+    goal_radius: float
+    rough_speed: float
+    rough_cos_tilt: float
+    vertical_mode: float  # 1 or 0
+    rough_fails: float  # 1 or 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class World:
+    """The box the vehicle lives in, with the water surface at z = 0 (paper, Sec. 4).
+
+    Attributes:
+        lower, upper: corners of the box in m; the vehicle's centre must stay inside.
+        zone: half-height mu of the transition zone in m.
+        sensor_range: an obstacle is detected once its surface has been this close to the vehicle's centre, m.
+        goal_radius: distance in m at which the goal counts as reached.
+        rough_speed: lateral speed in m/s above which a crossing is rough.
+        rough_tilt: tilt in rad above which a crossing is rough.
+        vertical_mode: inside the zone the lateral reference gives way to holding still.
+        rough_transition: "fail" ends an episode at a rough crossing; "count" only counts it.
+
+    Raises:
+        ValueError: a value out of range, named with its unit.
+    """
+
+    lower: tuple[float, float, float] = (-10.0, -10.0, -5.0)
+    upper: tuple[float, float, float] = (10.0, 10.0, 10.0)
+    zone: float = 0.8
+    sensor_range: float = 3.0
+    goal_radius: float = 0.5
+    rough_speed: float = 0.2
+    rough_tilt: float = math.radians(5.0)
+    vertical_mode: bool = True
+    rough_transition: str = "fail"
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in ("lower", "upper"):
+            corner = getattr(self, name)
+            if len(corner) != 3 or not all(math.isfinite(value) for value in corner):
+                raise ValueError(f"World.{name} must be three finite numbers (m), got {corner!r}")
+        for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
+            if low >= high:
+                raise ValueError(f"World.upper must exceed World.lower along {axis} (m), got {low!r} to {high!r}")
+        for name, unit in (
+            ("zone", "m"),
+            ("sensor_range", "m"),
+            ("goal_radius", "m"),
+            ("rough_speed", "m/s"),
+            ("rough_tilt", "rad"),
+        ):
+            value = getattr(self, name)
+            if not math.isfinite(value) or value <= 0:
+                raise ValueError(f"World.{name} must be positive ({unit}), got {value!r}")
+        if self.lower[2] >= -self.zone or self.upper[2] <= self.zone:
+            raise ValueError(
+                f"World must reach beyond the transition zone of +-{self.zone} m in z, "
+                f"got {self.lower[2]!r} to {self.upper[2]!r} m"
+            )
+        if not isinstance(self.vertical_mode, bool):
+            raise ValueError(f"World.vertical_mode must be True or False, got {self.vertical_mode!r}")
+        if self.rough_transition not in ("fail", "count"):
+            raise ValueError(f"World.rough_transition must be 'fail' or 'count', got {self.rough_transition!r}")
+
+
+def world_params(world: World) -> WorldParams:
+    """Flatten a world for the kernels."""
+    return WorldParams(
+        *world.lower,
+        *world.upper,
+        world.zone,
+        world.sensor_range,
+        world.goal_radius,
+        world.rough_speed,
+        math.cos(world.rough_tilt),
+        float(world.vertical_mode),
+        float(world.rough_transition == "fail"),
+    )

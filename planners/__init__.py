@@ -1,0 +1,1 @@
+"""Planners that fly the environments: each one is a policy."""
