@@ -32,6 +32,7 @@ class AirGainParams(NamedTuple):
     speed_limit: float
     vertical_speed_limit: float
     zone_speed_limit: float
+    zone_lateral_speed: float
 
 
 @inlined
@@ -64,12 +65,22 @@ def tilt_reference(state, attitude, reference, vertical, gains):
 
 
 @inlined
+def descent_share(state, vertical, gains):
+    """Share of the speed limit allowed downwards: in vertical mode the vehicle waits above the water until it is still.
+
+    One below `zone_lateral_speed`, zero above twice that.
+    """
+    lateral = np.sqrt(state.vx * state.vx + state.vy * state.vy)
+    return clamp(2.0 - lateral / gains.zone_lateral_speed, 0.0, 1.0) if vertical else 1.0
+
+
+@inlined
 def air_control(state, attitude, rates, integral, reference, vertical, hover_speed, gains, dt):
     """Return four unsaturated rotor speeds (rpm) and the new `Integral`."""
     error_z = reference.z - state.z
     limit = gains.zone_speed_limit if vertical else gains.vertical_speed_limit
     wanted = reference.vz + gains.altitude_p / gains.altitude_d * error_z
-    climb = clamp(wanted, -limit, limit)
+    climb = clamp(wanted, -limit * descent_share(state, vertical, gains), limit)
     # integrate only while the speed limit does not bind: the error is then no fault of the model
     gain_z = gains.altitude_i if wanted == climb else 0.0
     integral_z = accumulate(integral.z, gain_z, error_z, gains.altitude_i_limit, dt)

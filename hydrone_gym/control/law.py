@@ -15,21 +15,20 @@ def control(state, attitude, integral, reference, vertical, model, medium, air, 
     """
     rates = euler_rates(attitude, state.p, state.q, state.r)
     hover = model.vehicle.hover_speed
-    in_air, memory_air = air_control(state, attitude, rates, integral, reference, vertical, hover, model.air_gains, dt)
-    in_water, memory_water = water_control(
-        state, attitude, rates, integral, reference, vertical, model.vehicle.water, model.water_gains, dt
-    )
-    w1 = in_air[0] if air else in_water[0]
-    w2 = in_air[1] if air else in_water[1]
-    w3 = in_air[2] if air else in_water[2]
-    w4 = in_air[3] if air else in_water[3]
+    if air:
+        wanted, memory = air_control(state, attitude, rates, integral, reference, vertical, hover, model.air_gains, dt)
+    else:
+        wanted, memory = water_control(
+            state, attitude, rates, integral, reference, vertical, medium, model.water_gains, dt
+        )
+    w1, w2, w3, w4 = wanted
     low, high = medium.rotor_min, medium.rotor_max
     s1, s2, s3, s4 = clamp(w1, low, high), clamp(w2, low, high), clamp(w3, low, high), clamp(w4, low, high)
     free = s1 == w1 and s2 == w2 and s3 == w3 and s4 == w4
     memory = Integral(
-        (memory_air.z if air else memory_water.z) if free else integral.z,
-        (memory_air.phi if air else memory_water.phi) if free else integral.phi,
-        (memory_air.theta if air else memory_water.theta) if free else integral.theta,
-        (memory_air.psi if air else memory_water.psi) if free else integral.psi,
+        memory.z if free else integral.z,
+        memory.phi if free else integral.phi,
+        memory.theta if free else integral.theta,
+        memory.psi if free else integral.psi,
     )
     return (s1, s2, s3, s4), memory

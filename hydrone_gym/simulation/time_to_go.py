@@ -1,0 +1,59 @@
+"""Time to go: how long the vehicle would need to the goal in an empty world, in seconds.
+
+The environment's progress reward and the planner's cost-to-go are this one estimate. Water is the slow medium, so the
+surface is crossed in the column of whichever end lies in water.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hydrone_gym._jit import inlined
+
+GATE = 1.1  # m: crossings begin and end this far from the surface
+_SETTLE = 2.0  # s: coming to rest above or below the surface before a crossing
+_CRUISE = 0.9  # share of the limit speed that a flight with turns and stops averages
+
+
+class CruiseSpeeds(NamedTuple):
+    """Speeds (m/s) the vehicle reaches under its controller."""
+
+    air: float
+    climb: float
+    water: float
+    dive: float
+    zone: float
+
+
+@inlined
+def cruise_speeds(model):
+    """Work out the speeds from gains and drag: surge thrust against drag in water, the limits elsewhere."""
+    water = model.vehicle.water
+    surge = np.sqrt(2.0 * model.water_gains.surge_limit * water.inverse_mass / water.drag_x)
+    return CruiseSpeeds(
+        _CRUISE * model.air_gains.speed_limit,
+        _CRUISE * model.air_gains.vertical_speed_limit,
+        _CRUISE * surge,
+        _CRUISE * model.water_gains.vertical_speed_limit,
+        model.air_gains.zone_speed_limit,
+    )
+
+
+@inlined
+def time_to_go(x, y, z, goal_x, goal_y, goal_z, speeds):
+    """Return the time in s from a position to the goal (m), media and crossing considered, obstacles not."""
+    dx, dy = goal_x - x, goal_y - y
+    across = np.sqrt(dx * dx + dy * dy)
+    from_air, to_air = z > 0.0, goal_z > 0.0
+    climbing = abs(goal_z - z)
+    same_air = max(across / speeds.air, climbing / speeds.climb)
+    same_water = max(across / speeds.water, climbing / speeds.dive)
+    # changing medium: lateral flight and climbing in air overlap, then the crossing, then the leg in water
+    air_height = z if from_air else goal_z
+    water_height = goal_z if from_air else z
+    in_air = max(across / speeds.air, max(air_height - GATE, 0.0) / speeds.climb)
+    in_water = max(-GATE - water_height, 0.0) / speeds.dive
+    inside = min(air_height, GATE) - max(water_height, -GATE)
+    changing = in_air + in_water + inside * (1.0 / speeds.zone + _SETTLE / (2.0 * GATE))
+    same = same_air if from_air else same_water
+    return same if from_air == to_air else changing

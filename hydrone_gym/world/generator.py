@@ -1,0 +1,277 @@
+"""Seeded random scenarios: the law they are drawn by, the draw itself, and the proof that each can be flown.
+
+A draw costs microseconds, because a batch of environments resets thousands of times a second: blocks of uniform numbers
+from the generator go to one kernel that places ends and spheres and tries a few simple routes. Only a scenario without
+such a route is searched with a flood fill over a coarse grid.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.world.scenario import Scenario, check_end
+from hydrone_gym.world.solvability import flight_space, has_grid_route, has_simple_route
+from hydrone_gym.world.world import World
+
+WALL_MARGIN = 1.0  # m from a random end to the walls
+ZONE_MARGIN = 0.5  # m from a random end to the transition zone
+ATTEMPTS = 100  # scenarios drawn before a law is called unsolvable
+MOST_NUMBERS = 64  # one attempt gives up after this many times the usual count of uniform numbers
+MEDIA = ("air", "water")
+
+# What `_place` returns.
+_NO_ENDS, _NO_SPHERES, _NO_SIMPLE_ROUTE, _SIMPLE_ROUTE = range(4)
+
+_DRAW = np.dtype(
+    [
+        ("water_share", "f8", 2),  # probability of water, for start and goal
+        ("low", "f8", (2, 2, 3)),  # end, medium, axis: the boxes in which the ends are drawn; a fixed end is a point
+        ("high", "f8", (2, 2, 3)),
+        ("yaw", "f8"),  # half the range of the start's yaw
+        ("separation", "f8"),
+        ("clearance", "f8"),
+        ("radius", "f8", 2),
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioLaw:
+    """What random scenarios are drawn by (paper, Sec. 4: spheres randomly distributed between two ends).
+
+    Attributes:
+        num_obstacles: number of spheres; centres are uniform in the box, above and under water alike.
+        obstacle_radius: least and greatest radius in m, uniform in between.
+        end_clearance: distance in m, beyond the vehicle's radius, that every sphere's surface keeps to start and goal.
+        start, goal: fixed ends (x, y, z in m) with null yaw, or None to draw them; a drawn start has any yaw.
+        min_separation: least distance in m between start and goal where at least one of them is drawn.
+        media: medium of start and goal, each "air" or "water"; None tosses a fair coin for each drawn end.
+
+    Raises:
+        ValueError: a value out of range, named with its unit.
+    """
+
+    num_obstacles: int = 20
+    obstacle_radius: tuple[float, float] = (0.5, 1.5)
+    end_clearance: float = 1.0
+    start: tuple[float, float, float] | None = None
+    goal: tuple[float, float, float] | None = None
+    min_separation: float = 8.0
+    media: tuple[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        """Check every field as far as no world is needed; lists become tuples."""
+        count = self.num_obstacles
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
+            raise ValueError(f"ScenarioLaw.num_obstacles must be a whole number, not negative, got {count!r}")
+        radius = self._numbers("obstacle_radius", 2)
+        if not 0.0 < radius[0] <= radius[1]:
+            raise ValueError(f"ScenarioLaw.obstacle_radius must be positive and ascending (m), got {radius!r}")
+        for name in ("end_clearance", "min_separation"):
+            value = getattr(self, name)
+            if not _is_number(value) or value < 0.0:
+                raise ValueError(f"ScenarioLaw.{name} must be finite and not negative (m), got {value!r}")
+        for name in ("start", "goal"):
+            if getattr(self, name) is not None:
+                self._numbers(name, 3)
+        if self.media is None:
+            return
+        if not isinstance(self.media, tuple | list) or len(self.media) != 2 or not all(m in MEDIA for m in self.media):
+            raise ValueError(f'ScenarioLaw.media must be None or a pair of "air" and "water", got {self.media!r}')
+        object.__setattr__(self, "media", tuple(self.media))
+        for name, medium in zip(("start", "goal"), self.media, strict=True):
+            end = getattr(self, name)
+            if end is not None and (end[2] < 0.0) != (medium == "water"):
+                raise ValueError(f"ScenarioLaw.{name} must lie in {medium} as media says, got z = {end[2]!r} m")
+
+    def _numbers(self, name: str, length: int) -> tuple[float, ...]:
+        """Check a field that holds several numbers and keep it as a tuple, so that the law stays hashable."""
+        value = getattr(self, name)
+        if not isinstance(value, tuple | list) or len(value) != length or not all(map(_is_number, value)):
+            raise ValueError(f"ScenarioLaw.{name} must be {length} finite numbers (m), got {value!r}")
+        object.__setattr__(self, name, tuple(value))
+        return tuple(value)
+
+
+def _is_number(value: Any) -> bool:
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    return number and math.isfinite(value)
+
+
+EXPERIMENT_1 = ScenarioLaw(start=(-9.0, -9.0, 8.0), goal=(9.0, 9.0, -3.0))
+EXPERIMENT_2 = ScenarioLaw(start=(9.0, -9.0, -3.0), goal=(-9.0, 9.0, 7.0))
+
+
+@functools.lru_cache(maxsize=64)
+def prepare(law: ScenarioLaw, world: World, vehicle_radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Flatten a law in a world, for a vehicle of this radius (m), into the two read-only records that `draw` takes.
+
+    Raises ValueError when the law is impossible in this world: an end outside the box or in the transition zone, no room
+    for a drawn end or for the greatest sphere, ends that cannot be as far apart as the law says.
+    """
+    space = flight_space(world, vehicle_radius)
+    room = min(high - low for low, high in zip(world.lower, world.upper, strict=True))
+    if 2.0 * law.obstacle_radius[1] >= room:
+        raise ValueError(
+            f"ScenarioLaw.obstacle_radius must be less than {room / 2.0:g} m, half the shortest edge of the box, "
+            f"got {law.obstacle_radius[1]!r} m"
+        )
+    record = np.zeros(1, _DRAW)
+    for end, name in enumerate(("start", "goal")):
+        fixed = getattr(law, name)
+        if fixed is not None:
+            check_end(f"ScenarioLaw.{name}", fixed, world)
+            record["low"][0, end] = record["high"][0, end] = fixed
+            record["water_share"][0, end] = float(fixed[2] < 0.0)
+            continue
+        record["water_share"][0, end] = 0.5 if law.media is None else float(law.media[end] == "water")
+        for medium in range(2) if law.media is None else (MEDIA.index(law.media[end]),):
+            record["low"][0, end, medium], record["high"][0, end, medium] = _room_for_end(name, medium, world)
+    record["clearance"] = law.end_clearance + vehicle_radius
+    record["radius"] = law.obstacle_radius
+    record["yaw"] = math.pi if law.start is None else 0.0
+    if law.start is None or law.goal is None:
+        record["separation"] = law.min_separation
+        _check_separation(law.min_separation, record[0])
+    record.flags.writeable = False
+    return record, space
+
+
+def _room_for_end(name: str, medium: int, world: World) -> tuple[list[float], list[float]]:
+    """Corners (m) of the part of a medium in which an end may be drawn."""
+    low = [value + WALL_MARGIN for value in world.lower]
+    high = [value - WALL_MARGIN for value in world.upper]
+    if medium == 0:
+        low[2] = world.zone + ZONE_MARGIN
+    else:
+        high[2] = -world.zone - ZONE_MARGIN
+    for axis, least, most in zip("xyz", low, high, strict=True):
+        if least > most:
+            raise ValueError(
+                f"World leaves no room to draw a {name} in {MEDIA[medium]}: {WALL_MARGIN} m from the walls and "
+                f"{ZONE_MARGIN} m from the transition zone, {axis} would lie between {least:g} and {most:g} m"
+            )
+    return low, high
+
+
+def _check_separation(separation: float, record: np.void) -> None:
+    """Raise ValueError when for some pair of media the ends cannot be so far apart (m)."""
+    for pair in ((first, second) for first in range(2) for second in range(2)):
+        shares = [record["water_share"][end] if pair[end] else 1.0 - record["water_share"][end] for end in range(2)]
+        if min(shares) == 0.0:
+            continue
+        low, high = ([record[key][end, pair[end]] for end in range(2)] for key in ("low", "high"))
+        most = float(np.linalg.norm(np.maximum(high[0] - low[1], high[1] - low[0])))
+        if most < separation:
+            raise ValueError(
+                f"ScenarioLaw.min_separation must be at most {most:.3g} m for a start in {MEDIA[pair[0]]} and a goal in "
+                f"{MEDIA[pair[1]]} of this world, got {separation!r} m"
+            )
+
+
+@inlined
+def _place_ends(law, numbers, start, goal):
+    """Draw both ends; returns how many of the uniform numbers were used, or 0 when there were too few."""
+    first = 1 if numbers[0] < law.water_share[0] else 0
+    second = 1 if numbers[1] < law.water_share[1] else 0
+    used = 2
+    while used + 7 <= numbers.size:
+        apart2 = 0.0
+        for axis in range(3):
+            low, high = law.low[0, first, axis], law.high[0, first, axis]
+            start[axis] = low + numbers[used + axis] * (high - low)
+            low, high = law.low[1, second, axis], law.high[1, second, axis]
+            goal[axis] = low + numbers[used + 3 + axis] * (high - low)
+            apart2 += (goal[axis] - start[axis]) ** 2
+        start[3] = law.yaw * (2.0 * numbers[used + 6] - 1.0)
+        used += 7
+        if apart2 >= law.separation * law.separation:
+            return used
+    return 0
+
+
+@kernel
+def _place(record, space, numbers, start, goal, obstacles):
+    """Draw ends and spheres from uniform numbers in [0, 1) and try the simple routes.
+
+    Shapes: record and space (1,) from `prepare`, numbers (K,); start (4,), goal (3,) and obstacles (M, 4) are written.
+    Returns _NO_ENDS or _NO_SPHERES when the numbers ran out, else whether there is a simple route.
+    """
+    law, box = record[0], space[0]
+    used = _place_ends(law, numbers, start, goal)
+    if used == 0:
+        return _NO_ENDS
+    x, y, z = box.lower[0], box.lower[1], box.lower[2]
+    dx, dy, dz = box.upper[0] - x, box.upper[1] - y, box.upper[2] - z
+    placed = 0
+    while placed < obstacles.shape[0]:
+        if used + 4 > numbers.size:
+            return _NO_SPHERES
+        cx, cy, cz = x + numbers[used] * dx, y + numbers[used + 1] * dy, z + numbers[used + 2] * dz
+        radius = law.radius[0] + numbers[used + 3] * (law.radius[1] - law.radius[0])
+        used += 4
+        reach2 = (radius + law.clearance) ** 2
+        to_start2 = (cx - start[0]) ** 2 + (cy - start[1]) ** 2 + (cz - start[2]) ** 2
+        to_goal2 = (cx - goal[0]) ** 2 + (cy - goal[1]) ** 2 + (cz - goal[2]) ** 2
+        if to_start2 >= reach2 and to_goal2 >= reach2:
+            obstacles[placed, 0], obstacles[placed, 1], obstacles[placed, 2] = cx, cy, cz
+            obstacles[placed, 3] = radius
+            placed += 1
+    return _SIMPLE_ROUTE if has_simple_route(space, start, goal, obstacles) else _NO_SIMPLE_ROUTE
+
+
+def draw(
+    law: ScenarioLaw,
+    prepared: tuple[np.ndarray, np.ndarray],
+    rng: np.random.Generator,
+    start: np.ndarray,
+    goal: np.ndarray,
+    obstacles: np.ndarray,
+) -> None:
+    """Draw a solvable scenario into arrays: start (4,), goal (3,), obstacles (num_obstacles, 4), float64, contiguous.
+
+    `prepared` comes from `prepare` for the same law. Raises ValueError when the law leaves no room for ends or spheres,
+    or when none of `ATTEMPTS` scenarios was solvable.
+    """
+    record, space = prepared
+    usual = 30 + 5 * law.num_obstacles
+    for _ in range(ATTEMPTS):
+        numbers = rng.random(usual)
+        status = _place(record, space, numbers, start, goal, obstacles)
+        while status <= _NO_SPHERES:
+            if numbers.size >= MOST_NUMBERS * usual:
+                raise ValueError(_no_room(law, status))
+            # The same beginning is placed again: no state has to survive between the blocks.
+            numbers = np.concatenate((numbers, rng.random(numbers.size)))
+            status = _place(record, space, numbers, start, goal, obstacles)
+        if status == _SIMPLE_ROUTE or has_grid_route(space, start, goal, obstacles):
+            return
+    raise ValueError(
+        f"no solvable scenario after {ATTEMPTS} attempts: num_obstacles={law.num_obstacles}, "
+        f"radius={law.obstacle_radius} m"
+    )
+
+
+def _no_room(law: ScenarioLaw, status: int) -> str:
+    """Say what an attempt could not place."""
+    if status == _NO_ENDS:
+        return f"no ends found that are {law.min_separation} m apart: lower ScenarioLaw.min_separation"
+    return (
+        f"no room for {law.num_obstacles} obstacles of radius {law.obstacle_radius} m that keep {law.end_clearance} m "
+        "beyond the vehicle's radius to start and goal: lower ScenarioLaw.end_clearance or num_obstacles"
+    )
+
+
+def generate(law: ScenarioLaw, world: World, vehicle_radius: float, rng: np.random.Generator) -> Scenario:
+    """Draw a random scenario that a vehicle of this radius (m) can solve.
+
+    Equal states of `rng` give scenarios equal bit for bit. Raises ValueError for a law that is impossible in this world,
+    see `prepare` and `draw`.
+    """
+    start, goal, obstacles = np.empty(4), np.empty(3), np.empty((law.num_obstacles, 4))
+    draw(law, prepare(law, world, vehicle_radius), rng, start, goal, obstacles)
+    return Scenario(start=tuple(start.tolist()), goal=tuple(goal.tolist()), obstacles=obstacles)
