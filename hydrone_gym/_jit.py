@@ -72,3 +72,8 @@ def inlined(function: Callable) -> Callable:
     Without forced inlining a loop over lanes is compiled to one scalar call a lane, three times slower.
     """
     return numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+
+
+def routine(function: Callable) -> Callable:
+    """Compile a large function that other kernels call: one copy of its code, not inlined, not cached by itself."""
+    return numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)

@@ -1,1 +1,1 @@
-"""hydrone_gym.rendering."""
+"""Pictures from arrays: the paper's figures as Matplotlib figures, drawn without a display."""

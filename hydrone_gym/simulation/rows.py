@@ -15,17 +15,40 @@ def new_rows(count: int) -> np.ndarray:
 
 
 @inlined
+def load_vehicle(b, i, state, integral, old, new):
+    """Put a vehicle into lane i: state (12), controller memory (4), and the reference's move over the period."""
+    b.x[i], b.y[i], b.z[i] = state[0], state[1], state[2]
+    b.phi[i], b.theta[i], b.psi[i] = state[3], state[4], state[5]
+    b.vx[i], b.vy[i], b.vz[i] = state[6], state[7], state[8]
+    b.p[i], b.q[i], b.r[i] = state[9], state[10], state[11]
+    b.integral_z[i], b.integral_phi[i], b.integral_theta[i], b.integral_psi[i] = (
+        integral[0],
+        integral[1],
+        integral[2],
+        integral[3],
+    )
+    b.old_x[i], b.old_y[i], b.old_z[i], b.old_psi[i] = old[0], old[1], old[2], old[3]
+    b.move_x[i] = new[0] - old[0]
+    b.move_y[i] = new[1] - old[1]
+    b.move_z[i] = new[2] - old[2]
+    b.move_psi[i] = wrap(new[3] - old[3])
+
+
+@inlined
+def store_vehicle(b, i, state, integral):
+    """Take a vehicle's state (12) and controller memory (4) out of lane i."""
+    state[0], state[1], state[2] = b.x[i], b.y[i], b.z[i]
+    state[3], state[4], state[5] = b.phi[i], b.theta[i], b.psi[i]
+    state[6], state[7], state[8] = b.vx[i], b.vy[i], b.vz[i]
+    state[9], state[10], state[11] = b.p[i], b.q[i], b.r[i]
+    integral[0], integral[1] = b.integral_z[i], b.integral_phi[i]
+    integral[2], integral[3] = b.integral_theta[i], b.integral_psi[i]
+
+
+@inlined
 def load_row(b, i, row, reference):
     """Put a row into lane i, with the reference it moves to over the period."""
-    s, m, old = row.state, row.integral, row.reference
-    b.x[i], b.y[i], b.z[i], b.phi[i], b.theta[i], b.psi[i] = s[0], s[1], s[2], s[3], s[4], s[5]
-    b.vx[i], b.vy[i], b.vz[i], b.p[i], b.q[i], b.r[i] = s[6], s[7], s[8], s[9], s[10], s[11]
-    b.integral_z[i], b.integral_phi[i], b.integral_theta[i], b.integral_psi[i] = m[0], m[1], m[2], m[3]
-    b.old_x[i], b.old_y[i], b.old_z[i], b.old_psi[i] = old[0], old[1], old[2], old[3]
-    b.move_x[i] = reference[0] - old[0]
-    b.move_y[i] = reference[1] - old[1]
-    b.move_z[i] = reference[2] - old[2]
-    b.move_psi[i] = wrap(reference[3] - old[3])
+    load_vehicle(b, i, row.state, row.integral, row.reference, reference)
     b.goal_x[i], b.goal_y[i], b.goal_z[i] = row.goal[0], row.goal[1], row.goal[2]
     b.ticks[i], b.energy[i], b.clearance[i] = row.ticks, row.energy, row.clearance
     b.outcome[i], b.crossings[i] = row.outcome, row.crossings
@@ -34,10 +57,7 @@ def load_row(b, i, row, reference):
 @inlined
 def store_row(b, i, row):
     """Put lane i back into its row; the reference is the driver's business."""
-    s, m = row.state, row.integral
-    s[0], s[1], s[2], s[3], s[4], s[5] = b.x[i], b.y[i], b.z[i], b.phi[i], b.theta[i], b.psi[i]
-    s[6], s[7], s[8], s[9], s[10], s[11] = b.vx[i], b.vy[i], b.vz[i], b.p[i], b.q[i], b.r[i]
-    m[0], m[1], m[2], m[3] = b.integral_z[i], b.integral_phi[i], b.integral_theta[i], b.integral_psi[i]
+    store_vehicle(b, i, row.state, row.integral)
     row.ticks, row.energy, row.clearance = b.ticks[i], b.energy[i], b.clearance[i]
     row.outcome, row.crossings = b.outcome[i], b.crossings[i]
 

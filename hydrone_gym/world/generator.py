@@ -110,8 +110,8 @@ EXPERIMENT_2 = ScenarioLaw(start=(9.0, -9.0, -3.0), goal=(-9.0, 9.0, 7.0))
 def prepare(law: ScenarioLaw, world: World, vehicle_radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Flatten a law in a world, for a vehicle of this radius (m), into the two read-only records that `draw` takes.
 
-    Raises ValueError when the law is impossible in this world: an end outside the box or in the transition zone, no room
-    for a drawn end or for the greatest sphere, ends that cannot be as far apart as the law says.
+    Raises ValueError when the law is impossible in this world: an end outside the box or in the transition zone, no
+    room for a drawn end or for the greatest sphere, ends that cannot be as far apart as the law says.
     """
     space = flight_space(world, vehicle_radius)
     room = min(high - low for low, high in zip(world.lower, world.upper, strict=True))
@@ -168,8 +168,8 @@ def _check_separation(separation: float, record: np.void) -> None:
         most = float(np.linalg.norm(np.maximum(high[0] - low[1], high[1] - low[0])))
         if most < separation:
             raise ValueError(
-                f"ScenarioLaw.min_separation must be at most {most:.3g} m for a start in {MEDIA[pair[0]]} and a goal in "
-                f"{MEDIA[pair[1]]} of this world, got {separation!r} m"
+                f"ScenarioLaw.min_separation must be at most {most:.3g} m for a start in {MEDIA[pair[0]]} and a goal "
+                f"in {MEDIA[pair[1]]} of this world, got {separation!r} m"
             )
 
 
@@ -269,9 +269,11 @@ def _no_room(law: ScenarioLaw, status: int) -> str:
 def generate(law: ScenarioLaw, world: World, vehicle_radius: float, rng: np.random.Generator) -> Scenario:
     """Draw a random scenario that a vehicle of this radius (m) can solve.
 
-    Equal states of `rng` give scenarios equal bit for bit. Raises ValueError for a law that is impossible in this world,
-    see `prepare` and `draw`.
+    Equal states of `rng` give scenarios equal bit for bit. Raises ValueError for a law that is impossible in this
+    world, see `prepare` and `draw`.
     """
     start, goal, obstacles = np.empty(4), np.empty(3), np.empty((law.num_obstacles, 4))
     draw(law, prepare(law, world, vehicle_radius), rng, start, goal, obstacles)
-    return Scenario(start=tuple(start.tolist()), goal=tuple(goal.tolist()), obstacles=obstacles)
+    x, y, z, yaw = start.tolist()
+    goal_x, goal_y, goal_z = goal.tolist()
+    return Scenario(start=(x, y, z, yaw), goal=(goal_x, goal_y, goal_z), obstacles=obstacles)

@@ -1,9 +1,9 @@
 """Can a scenario be flown at all? First a handful of simple routes, then a flood fill over a coarse grid.
 
-Both keep `ROUTE_MARGIN` beyond the vehicle's radius to every sphere and move only vertically inside the transition zone.
-A simple route is a proof in continuous space. The grid is a proof too, because between the centres of two free cells
-the way loses at most ``R - sqrt(R**2 - CELL**2 / 4)`` of the distance R to a sphere's centre, less than the margin for
-R > 0.3 m; but it misses passages narrower than about one cell, so it errs towards "unsolvable".
+Both keep `ROUTE_MARGIN` beyond the vehicle's radius to every sphere and move only vertically inside the transition
+zone. A simple route is a proof in continuous space. So is a way through the grid: between the centres of two free cells
+it loses at most ``R - sqrt(R**2 - CELL**2 / 4)`` of the distance R to a sphere's centre, less than the margin for
+R > 0.3 m. But the grid misses passages narrower than about one cell, so it errs towards "unsolvable".
 """
 
 import numpy as np

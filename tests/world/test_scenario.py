@@ -216,7 +216,11 @@ def test_truncated_files_are_refused(tmp_path, share):
 
 def test_other_content_is_refused(tmp_path):
     path = tmp_path / "other.json"
-    for content, message in ((b"[]", "not a scenario file"), (b"\xff\xfe\x00", "codec can't decode"), (b"1e999", "not")):
+    for content, message in (
+        (b"[]", "not a scenario file"),
+        (b"\xff\xfe\x00", "codec can't decode"),
+        (b"1e999", "not"),
+    ):
         path.write_bytes(content)
         with pytest.raises(ValueError, match=rf"other\.json: .*{message}"):
             load_scenario(path)

@@ -1,0 +1,356 @@
+"""`HydroneEnv`: one vehicle and one mission as a Gymnasium environment."""
+
+import copy
+import inspect
+import math
+import os
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.error import ResetNeeded
+from numpy.typing import ArrayLike, NDArray
+
+from hydrone_gym.envs.options import Options
+from hydrone_gym.envs.reward import TERMS
+from hydrone_gym.envs.snapshot import Snapshot
+from hydrone_gym.envs.spaces import action_space, observation_space
+from hydrone_gym.envs.task import REPORT, copy_episodes, new_episodes, settle
+from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.simulation import TICK, Simulation, row_at
+from hydrone_gym.vehicle import Vehicle, named_vehicle
+from hydrone_gym.world.generator import generate
+from hydrone_gym.world.scenario import Scenario, load_scenario, validate
+from hydrone_gym.world.world import World
+
+Observation = dict[str, NDArray[np.float64]]
+
+_OUTCOMES = tuple(Outcome)
+
+
+class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
+    """A hybrid quadrotor flies, dives and swims to its goal among spheres it only sees from near.
+
+    ## Description
+    The HyDrone lives in a box of 20 x 20 x 15 m, air above z = 0 and water below. It starts at rest and has to reach the
+    goal within 0.5 m, without touching a sphere and without crossing the surface roughly. A step is one period: the
+    reference moves on a straight line from where it was to the action, and the paper's control laws follow it at
+    100 Hz. Inside the transition zone, abs(z) <= 0.8 m, `vertical_mode` holds the vehicle still laterally, and in air
+    it does not descend before it is nearly at rest. World frame: x, y horizontal, z up; SI units.
+
+    | id | start | goal |
+    |---|---|---|
+    | `HydroneGym/AirToWater-v0` | (-9, -9, 8) | (9, 9, -3), the paper's Experiment 1 |
+    | `HydroneGym/WaterToAir-v0` | (9, -9, -3) | (-9, 9, 7), the paper's Experiment 2 |
+    | `HydroneGym/Mission-v0` | random, either medium, any yaw | random, either medium, 8 m or more away |
+
+    ## Action Space
+    `Box` (4,) float32: the reference `[x, y, z, psi]` at the end of the period, in m and rad, world frame, inside the
+    box and psi in [-pi, pi]. What lies outside is clipped to the space. In water the heading follows the line of sight
+    and psi is not used.
+
+    ## Observation Space
+    `Dict` of float64 boxes with finite bounds; every array returned is new.
+
+    | key | shape | content |
+    |---|---|---|
+    | `state` | (12,) | position (m), ZXY Euler angles phi, theta, psi (rad), velocity (m/s, world), angular velocity (rad/s, body) |
+    | `integral` | (4,) | the controller's memory: altitude, roll, pitch, yaw (rpm in air, N in water) |
+    | `reference` | (4,) | the reference now in force (m, m, m, rad) |
+    | `goal` | (3,) | m |
+    | `obstacles` | (num_obstacles, 4) | `[x, y, z, r]` (m) of the spheres detected so far, in order of detection; zero rows after |
+
+    A sphere is detected once its surface has been within `sensor_range` of the vehicle's centre.
+
+    ## Rewards
+    The sum of the terms in `info["reward_terms"]`, defined with their reasons in `hydrone_gym.envs.reward`:
+
+    | term | value |
+    |---|---|
+    | `progress` | 0.1 for each second by which the time-to-go in an empty world fell |
+    | `time` | -0.025 each step |
+    | `slow` | -0.025 for a step that ends slower than 0.2 m/s |
+    | `goal` | +1.5 on arrival |
+    | `collision`, `rough_crossing`, `out_of_bounds`, `diverged` | -2 |
+
+    ## Starting State
+    At rest and level at the start of the scenario, its reference where it is. The spheres (centres anywhere in the box,
+    1 m or more from the vehicle at both ends) are drawn anew at each reset such that a way exists.
+    `reset(options={"scenario": scenario})` flies a given `Scenario`, or the file it was saved to.
+
+    ## Episode End
+    Terminated, by `info["outcome"]`: GOAL; COLLISION (the vehicle's sphere touches an obstacle); OUT_OF_BOUNDS (its centre
+    leaves the box); ROUGH_TRANSITION (a crossing with lateral speed above 0.2 m/s or tilt above 5 degrees, unless
+    `rough_transition="count"`); DIVERGED (the model's limits of speed, turning rate or tilt). These are judged every
+    0.05 s, and the observation is that of the instant. Truncated: TIMEOUT, at the end of the period in which `time_limit`
+    is reached. The environment does this itself; the ids are registered without `max_episode_steps`.
+
+    `info` holds `outcome`, `time` (s), `energy` (J, of the rotors' shafts), `clearance` (least so far this episode, m;
+    infinite without obstacles), `transitions` (a dict for each crossing: `time` (s), `direction` "entry" or "exit",
+    `lateral_speed` (m/s), `tilt` (rad), `vertical_speed` (m/s); at most 8 a period), `reward_terms` and, at the end,
+    `is_success`.
+
+    ## Arguments
+    All by keyword, also through `gymnasium.make`:
+
+    - `mission`: "air_to_water", "water_to_air" or "random"; set by the id.
+    - `num_obstacles` (20): number of spheres; at least as many as a given scenario has.
+    - `obstacle_radius` ((0.5, 1.5)): least and greatest radius, m.
+    - `sensor_range` (3.0): m.
+    - `vehicle` ("paper"): "paper", "physical" or a `Vehicle`.
+    - `period` (0.5): seconds a step, a multiple of 0.05.
+    - `vertical_mode` (True): hold still laterally inside the transition zone.
+    - `rough_transition` ("fail"): "fail" ends an episode at a rough crossing, "count" only notes it.
+    - `time_limit` (120.0): s.
+    - `interface` ("world"): the spaces above.
+    - `render_mode` (None): nothing is drawn yet.
+
+    Raises TypeError for an unknown option and ValueError for a value out of range.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 2}
+
+    def __init__(
+        self,
+        *,
+        mission: str = "random",
+        num_obstacles: int = 20,
+        obstacle_radius: tuple[float, float] = (0.5, 1.5),
+        sensor_range: float = 3.0,
+        vehicle: str | Vehicle = "paper",
+        period: float = 0.5,
+        vertical_mode: bool = True,
+        rough_transition: str = "fail",
+        time_limit: float = 120.0,
+        interface: str = "world",
+        render_mode: str | None = None,
+        **unknown: object,
+    ) -> None:
+        """Check the options and set up the simulation."""
+        if unknown:
+            raise TypeError(f"unknown option {', '.join(map(repr, unknown))}; known are {', '.join(known_options())}")
+        if render_mode is not None:
+            raise ValueError(f"render_mode must be None, got {render_mode!r}")
+        self.render_mode = render_mode
+        self.options = Options(
+            mission=mission,
+            num_obstacles=num_obstacles,
+            obstacle_radius=obstacle_radius,
+            sensor_range=sensor_range,
+            vehicle=named_vehicle(vehicle),
+            period=period,
+            vertical_mode=vertical_mode,
+            rough_transition=rough_transition,
+            time_limit=time_limit,
+            interface=interface,
+        )
+        self._simulation = Simulation(self.options.vehicle, self.options.world, period, lanes=1)
+        self.action_space = action_space(self.world)
+        self.observation_space = observation_space(self.vehicle, self.world, self.options.num_obstacles)
+        self._lowest = self.action_space.low.astype(np.float64)
+        self._highest = self.action_space.high.astype(np.float64)
+        self._reference = np.zeros((1, 4))
+        self._report = np.zeros((1, len(REPORT)))
+        self._time_limit_ticks = math.ceil(time_limit / TICK - 1e-9)
+        self._episodes = new_episodes(1, self.options.num_obstacles, lanes=1)
+        self._scenario: Scenario | None = None
+        self._transitions: list[dict[str, Any]] = []
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation that steps it: vehicle, world and period for planners."""
+        return self._simulation
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle."""
+        return self._simulation.vehicle
+
+    @property
+    def world(self) -> World:
+        """Bounds, surface, sensing and what counts as arrival."""
+        return self._simulation.world
+
+    @property
+    def scenario(self) -> Scenario:
+        """The mission being flown; raises ResetNeeded before the first reset."""
+        if self._scenario is None:
+            raise ResetNeeded("there is no scenario before the first reset: call reset()")
+        return self._scenario
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
+        """Begin an episode.
+
+        Args:
+            seed: seeds the random stream of scenarios.
+            options: {"scenario": Scenario, or the path of its JSON file} flies that one; it is not random then.
+
+        Returns:
+            Observation and info, as in the class's description.
+
+        Raises:
+            ValueError: an unknown key, or a scenario that is impossible in this world.
+        """
+        super().reset(seed=seed)
+        given = dict(options or {})
+        chosen = given.pop("scenario", None)
+        if given:
+            raise ValueError(f"unknown reset option {', '.join(map(repr, given))}; known are 'scenario'")
+        if chosen is None:
+            scenario = generate(self.options.law, self.world, self.vehicle.radius, self.np_random)
+        else:
+            scenario = self._checked(chosen)
+        self._begin(scenario)
+        return self._observation(), self._info(self._report[0].tolist())
+
+    def _checked(self, chosen: Scenario | str | os.PathLike) -> Scenario:
+        """Return a scenario or load it, and check that this environment can fly it."""
+        if isinstance(chosen, str | os.PathLike):
+            chosen = load_scenario(Path(chosen))
+        if not isinstance(chosen, Scenario):
+            raise ValueError(f"scenario must be a Scenario or the path of its file, got {type(chosen).__name__}")
+        validate(chosen, self.world, self.vehicle.radius)
+        most = self.options.num_obstacles
+        if len(chosen.obstacles) > most:
+            raise ValueError(
+                f"scenario must have at most num_obstacles={most} obstacles, got {len(chosen.obstacles)}: "
+                "make the environment with more"
+            )
+        bounds: Any = self.observation_space["obstacles"]
+        for index, sphere in enumerate(chosen.obstacles):
+            if (sphere < bounds.low[index]).any() or (sphere > bounds.high[index]).any():
+                low, high = bounds.low[index].tolist(), bounds.high[index].tolist()
+                raise ValueError(f"obstacle {index} must lie between {low} and {high} (m), got {sphere.tolist()}")
+        return chosen
+
+    def _begin(self, scenario: Scenario) -> None:
+        """Put the vehicle at the start of a scenario, with nothing known but what is in range there."""
+        state = np.zeros(12)
+        state[:3] = scenario.start[:3]
+        state[5] = math.remainder(scenario.start[3], 2.0 * math.pi)
+        now = self._episodes
+        now.rows[:] = row_at(state, np.array(scenario.goal))
+        now.obstacles[:] = 0.0
+        now.obstacles[0, : scenario.obstacles.size] = scenario.obstacles.ravel()
+        now.closest[:] = np.inf
+        now.seen[:] = 0
+        self._scenario = scenario
+        self._transitions = []
+        self._settle(True)
+
+    def _settle(self, starting: bool) -> None:
+        count = len(self.scenario.obstacles)
+        limit = self._time_limit_ticks
+        settle(*self._episodes, count, 1, self._simulation.values, limit, 0, 1, starting, self._report)
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Fly one period with the reference moving to the action.
+
+        Args:
+            action: (4,) x, y, z in m and psi in rad; clipped to the action space.
+
+        Returns:
+            Observation, reward, terminated, truncated and info, as in the class's description.
+
+        Raises:
+            ValueError: an action of another shape, or not finite.
+            ResetNeeded: before the first reset, or after the end of an episode.
+        """
+        now = self._episodes
+        if self._scenario is None:
+            raise ResetNeeded("step() was called before reset(): call reset() first")
+        if now.rows["outcome"][0] != Outcome.RUNNING:
+            ended = Outcome(int(now.rows["outcome"][0])).name
+            raise ResetNeeded(f"step() was called after the episode ended with {ended}: call reset() first")
+        self._load_reference(action)
+        count = len(self._scenario.obstacles)
+        self._simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
+        self._settle(False)
+        report = self._report[0].tolist()
+        if report[-1] > 0.0:
+            self._note_crossings(int(report[-1]))
+        info = self._info(report)
+        outcome = info["outcome"]
+        truncated = outcome is Outcome.TIMEOUT
+        terminated = outcome is not Outcome.RUNNING and not truncated
+        if terminated or truncated:
+            info["is_success"] = outcome is Outcome.GOAL
+        return self._observation(), report[len(TERMS)], terminated, truncated, info
+
+    def _load_reference(self, action: ArrayLike) -> None:
+        """Check an action and clip it to the action space."""
+        try:
+            reference = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"action must be four numbers [x, y, z, psi] (m, m, m, rad), got {action!r}") from None
+        if reference.shape != (4,):
+            raise ValueError(f"action must have shape (4,) [x, y, z, psi] (m, m, m, rad), got {reference.shape}")
+        if not all(map(math.isfinite, reference.tolist())):
+            raise ValueError(f"action must be finite [x, y, z, psi] (m, m, m, rad), got {reference}")
+        np.maximum(reference, self._lowest, out=self._reference[0])
+        np.minimum(self._reference[0], self._highest, out=self._reference[0])
+
+    def _note_crossings(self, crossings: int) -> None:
+        """Append this period's crossings, from the row's log."""
+        for entry in self._episodes.rows["crossing_log"][0, : min(crossings, LOGGED_CROSSINGS)].tolist():
+            crossing: dict[str, Any] = dict(zip(CROSSING_FIELDS, entry, strict=True))
+            crossing["direction"] = "exit" if crossing["direction"] > 0.0 else "entry"
+            self._transitions.append(crossing)
+
+    def _observation(self) -> Observation:
+        rows = self._episodes.rows
+        return {
+            "state": rows["state"][0].copy(),
+            "integral": rows["integral"][0].copy(),
+            "reference": rows["reference"][0].copy(),
+            "goal": rows["goal"][0].copy(),
+            "obstacles": self._episodes.known[0].copy(),
+        }
+
+    def _info(self, report: list[float]) -> dict[str, Any]:
+        """What `info` always holds, from one row of `REPORT`; at reset the reward terms are null."""
+        terms = len(TERMS)
+        return {
+            "outcome": _OUTCOMES[int(report[terms + 1])],
+            "time": report[terms + 2],
+            "energy": report[terms + 3],
+            "clearance": report[terms + 4],
+            "transitions": [dict(crossing) for crossing in self._transitions],
+            "reward_terms": dict(zip(TERMS, report)),
+        }
+
+    def get_state(self) -> Snapshot:
+        """Return a complete snapshot of the episode and the random stream; raises ResetNeeded before reset."""
+        return Snapshot(
+            options=self.options,
+            scenario=self.scenario,
+            episodes=copy_episodes(self._episodes),
+            transitions=tuple(dict(crossing) for crossing in self._transitions),
+            random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
+            seed=self._np_random_seed,
+        )
+
+    def set_state(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot, bit for bit; it can be used again.
+
+        Raises TypeError for anything else, ValueError for a snapshot of an environment with other options.
+        """
+        if not isinstance(snapshot, Snapshot):
+            raise TypeError(f"snapshot must come from get_state(), got {type(snapshot).__name__}")
+        snapshot.check_options(self.options)
+        self._episodes = copy_episodes(snapshot.episodes)
+        self._scenario = snapshot.scenario
+        self._transitions = [dict(crossing) for crossing in snapshot.transitions]
+        self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
+        self._np_random_seed = snapshot.seed
+
+
+def known_options() -> tuple[str, ...]:
+    """Names of the options every environment of this package takes."""
+    parameters = inspect.signature(HydroneEnv.__init__).parameters.values()
+    return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)

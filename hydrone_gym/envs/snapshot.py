@@ -1,0 +1,39 @@
+"""A complete snapshot of an environment: enough to go on bit for bit, in this process or another."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+from hydrone_gym.envs.options import Options
+from hydrone_gym.envs.task import Episodes
+from hydrone_gym.world.scenario import Scenario
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Snapshot:
+    """What `HydroneEnv.get_state` returns; picklable, shares no memory with the environment.
+
+    Attributes:
+        options: the options of the environment it was taken from; only such an environment can restore it.
+        scenario: the mission being flown.
+        episodes: state, memory, distances and detections.
+        transitions: the crossings so far.
+        random_state: state of the bit generator that draws scenarios.
+        seed: the seed it was made from.
+    """
+
+    options: Options
+    scenario: Scenario
+    episodes: Episodes
+    transitions: tuple[dict[str, Any], ...]
+    random_state: dict[str, Any]
+    seed: int | None
+
+    def check_options(self, options: Options) -> None:
+        """Raise ValueError naming every option in which another environment differs."""
+        differing = [
+            f"{spec.name} (snapshot {getattr(self.options, spec.name)!r}, here {getattr(options, spec.name)!r})"
+            for spec in fields(Options)
+            if getattr(self.options, spec.name) != getattr(options, spec.name)
+        ]
+        if differing:
+            raise ValueError(f"snapshot is of an environment with other options: {', '.join(differing)}")

@@ -1,0 +1,186 @@
+"""Figures in three dimensions: the executed path in its world (paper, Figs. 6 and 9) and a planner's tree (Fig. 5).
+
+Functions take arrays in SI units and return Matplotlib figures; `save_figure` writes them as PNG and PDF. Matplotlib is
+imported when the first figure is drawn, and no display is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym.rendering import style
+from hydrone_gym.rendering.scene3d import Scene, split_at_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LOWER = (-10.0, -10.0, -5.0)  # m: the box of the paper's experiments
+UPPER = (10.0, 10.0, 10.0)
+FORMATS = ("png", "pdf")
+_DASH = 0.3  # m: dashes of a path under water
+
+
+def camera_azimuth(start: Sequence[float], goal: Sequence[float]) -> float:
+    """Return the azimuth (degrees) from which the way from start to goal (m) is seen from the side."""
+    return float(np.degrees(np.arctan2(goal[1] - start[1], goal[0] - start[0]))) - 75.0
+
+
+def plot_path(
+    positions: NDArray[np.float64],
+    goal: Sequence[float],
+    detected: NDArray[np.float64],
+    undetected: NDArray[np.float64],
+    *,
+    lower: tuple[float, float, float] = LOWER,
+    upper: tuple[float, float, float] = UPPER,
+    title: str = "",
+) -> Figure:
+    """Draw an executed path in its world (paper, Figs. 6 and 9).
+
+    Args:
+        positions: (N, 3) m, in order of time; solid in air, dashed under water.
+        goal: (3,) m.
+        detected, undetected: (k, 4) spheres x, y, z, r in m, black and faint.
+        lower, upper: corners of the world, m.
+        title: shown above.
+    """
+    scene = Scene(lower, upper, azimuth=camera_azimuth(positions[0], goal))
+    scene.spheres(undetected, style.FAINT, alpha=0.55)
+    scene.spheres(detected, style.DETECTED)
+    air, water = split_media(positions)
+    scene.lines(air, style.RED, 2.8, hidden=0.5)
+    scene.lines([dash for line in water for dash in _dashes(line)], style.RED, 2.8, hidden=0.5)
+    crossings = crossing_points(positions)
+    for number, point in enumerate(crossings):
+        scene.ring(point, "" if number else "crossing of the surface")
+    scene.mark(positions[0], "o", style.BLACK, 10, "start")
+    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
+    _legend(scene, title, _path_entries(len(undetected) > 0, bool(air), bool(water)))
+    return scene.figure
+
+
+def plot_tree(
+    edges: NDArray[np.float64],
+    in_air: NDArray[np.bool_],
+    start: Sequence[float],
+    goal: Sequence[float],
+    obstacles: NDArray[np.float64],
+    *,
+    solution: NDArray[np.float64] | None = None,
+    lower: tuple[float, float, float] = LOWER,
+    upper: tuple[float, float, float] = UPPER,
+    title: str = "",
+) -> Figure:
+    """Draw a planner's tree with every obstacle known (paper, Fig. 5).
+
+    Args:
+        edges: (E, K, 3) the points of each edge, m, K at least 2.
+        in_air: (E,) True for edges in air (red), False for edges under water (purple).
+        start, goal: (3,) m, black dot and purple cross.
+        obstacles: (M, 4) spheres x, y, z, r in m.
+        solution: (N, 3) the chosen path, m, if any.
+        lower, upper: corners of the world, m.
+        title: shown above.
+
+    Raises:
+        ValueError: edges and media that do not match.
+    """
+    edges, in_air = np.asarray(edges, dtype=np.float64), np.asarray(in_air, dtype=bool)
+    if edges.ndim != 3 or edges.shape[1] < 2 or edges.shape[2] != 3 or in_air.shape != edges.shape[:1]:
+        raise ValueError(f"edges must be (E, K, 3) with K >= 2 and in_air (E,), got {edges.shape} and {in_air.shape}")
+    scene = Scene(lower, upper, azimuth=camera_azimuth(start, goal))
+    scene.spheres(obstacles, style.DETECTED)
+    scene.lines(list(edges[in_air]), style.RED, 0.9, alpha=0.8)
+    scene.lines(list(edges[~in_air]), style.PURPLE, 0.9, alpha=0.9)
+    if solution is not None and len(solution) > 1:
+        scene.lines([np.asarray(solution)], style.BLACK, 2.2, hidden=0.5)
+    scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
+    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
+    entries: list[tuple[str, dict[str, object]]] = [
+        ("branch in air", {"color": style.RED, "linewidth": 2.0}),
+        ("branch under water", {"color": style.PURPLE, "linewidth": 2.0}),
+        ("obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}),
+    ]
+    if solution is not None:
+        entries.insert(2, ("chosen path", {"color": style.BLACK, "linewidth": 2.2}))
+    _legend(scene, title, entries)
+    return scene.figure
+
+
+def save_figure(figure: Figure, path: str | Path) -> list[Path]:
+    """Write a figure beside `path` (no suffix) as PNG and PDF; return both paths. The folder must exist."""
+    written = [Path(f"{path}.{suffix}") for suffix in FORMATS]
+    for target in written:
+        # no date inside, so equal flights give equal files
+        extra = {"metadata": {"CreationDate": None}} if target.suffix == ".pdf" else {}
+        figure.savefig(target, dpi=style.DOTS_PER_INCH, **extra)
+    return written
+
+
+def split_media(positions: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Cut a path (N, 3) at the surface into its parts in air and its parts under water."""
+    line = split_at_surface(np.asarray(positions, dtype=np.float64))
+    wet = line[:-1, 2] + line[1:, 2] < 0.0
+    cuts = [0, *(np.flatnonzero(wet[1:] != wet[:-1]) + 1).tolist(), len(line) - 1]
+    parts: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
+    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        if last > first:
+            parts[int(wet[first])].append(line[first : last + 1])
+    return parts
+
+
+def crossing_points(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where a path (N, 3) crosses z = 0, (c, 3), interpolated between samples."""
+    z = np.asarray(positions)[:, 2]
+    # the medium of a sample on the surface is water, as in the model
+    first = np.flatnonzero((z[:-1] > 0.0) != (z[1:] > 0.0))
+    share = (z[first] / (z[first] - z[first + 1]))[:, None]
+    points = positions[first] + share * (positions[first + 1] - positions[first])
+    points[:, 2] = 0.0
+    return points
+
+
+def _dashes(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Cut dashes out of a polyline (n, 3) by its length: a dash pattern would restart in every piece of the scene."""
+    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
+    dashes = []
+    for begin in np.arange(0.0, along[-1], 1.7 * _DASH):
+        end = min(begin + _DASH, along[-1])
+        inside = along[(along > begin) & (along < end)]
+        samples = np.concatenate(([begin], inside, [end]))
+        dashes.append(np.column_stack([np.interp(samples, along, line[:, axis]) for axis in range(3)]))
+    return dashes
+
+
+def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, object]]]) -> None:
+    """Put a title and a legend below the scene: the entries, then every mark that has a label."""
+    from matplotlib import rc_context
+    from matplotlib.lines import Line2D
+
+    marks = [line for line in scene.axes.lines if not str(line.get_label()).startswith("_") and line.get_label()]
+    handles = [Line2D([], [], label=label, **look) for label, look in entries]
+    with rc_context(style.FONTS):
+        scene.figure.legend(
+            handles=[*handles, *marks], loc="lower center", ncols=4, frameon=False, columnspacing=1.4, handlelength=1.6
+        )
+        scene.figure.suptitle(title, y=0.975)
+
+
+_BALL = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
+
+
+def _path_entries(unknown: bool, air: bool, water: bool) -> list[tuple[str, dict[str, object]]]:
+    entries: list[tuple[str, dict[str, object]]] = []
+    if air:
+        entries.append(("path in air", {"color": style.RED, "linewidth": 2.8}))
+    if water:
+        entries.append(("path under water", {"color": style.RED, "linewidth": 2.8, "linestyle": (0, (1.6, 1.1))}))
+    entries.append(("detected obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}))
+    if unknown:
+        entries.append(("undetected obstacle", {**_BALL, "markerfacecolor": style.FAINT[0]}))
+    return entries

@@ -1,0 +1,23 @@
+"""Colours and fonts of every figure: the Okabe-Ito palette, which colour-blind readers can tell apart."""
+
+RED = "#D55E00"  # vermillion: executed paths, branches in air
+PURPLE = "#CC79A7"  # reddish purple: branches under water, the goal
+BLUE = "#0072B2"  # crossings
+WATER = "#56B4E9"  # the water surface and the transition zone
+BLACK = "#000000"  # references, the start
+DETECTED = ("#1c1c1c", "#747474")  # darkest and lightest shade of an obstacle the vehicle knows
+FAINT = ("#e3e3e3", "#fafafa")  # the same for one it never came near
+
+DOTS_PER_INCH = 150
+FONTS: dict[str, object] = {
+    "font.size": 12,
+    "axes.labelsize": 13,
+    "axes.titlesize": 13,
+    "legend.fontsize": 11,
+    "xtick.labelsize": 11,
+    "ytick.labelsize": 11,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "pdf.fonttype": 42,  # text stays text
+    "path.simplify": True,
+}

@@ -1,0 +1,212 @@
+"""Algorithm 2: one cycle of the execution loop.
+
+Take in what was sensed, expand, choose the best path, re-propagate it, verify that its first edge can be followed by
+a stop, send it; prune and choose again where that fails; else go on with the stop that was verified before.
+"""
+
+import numpy as np
+
+from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.simulation.time_to_go import cruise_speeds, time_to_go
+from hydrone_gym.world.obstacles import swept_distance
+from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
+from planners.cl_rrt.expand import expand_tree
+from planners.cl_rrt.references import hover_reference
+from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, copy_node, prune_orphans, reroot
+
+_BEND = 0.1  # m: how far an edge may leave its chord
+
+
+@inlined
+def take_root(work, size, goal, speeds, now, root):
+    """Root the tree where the vehicle is: at the predicted node if there is one, with the observed state in it."""
+    if root >= 0 and root < size:
+        size = reroot(work.nodes, size, root, work.path)
+    else:
+        size = 1
+        work.nodes[0].parent, work.nodes[0].next, work.nodes[0].kind = -1, -1, OPEN
+        work.nodes[0].dead, work.nodes[0].goal = 0, 0
+    n = work.nodes[0]
+    for c in range(12):
+        n.state[c] = now[c]
+    for c in range(4):
+        n.integral[c] = now[12 + c]
+        n.reference[c] = now[16 + c]
+    n.time, n.unsafe, n.tried, n.dead = 0.0, 0, 0, 0
+    n.to_go = time_to_go(now[0], now[1], now[2], goal[0], goal[1], goal[2], speeds)
+    return size
+
+
+@inlined
+def prune_blocked(work, size, known_before, radius, margin):
+    """Kill the edges that obstacles detected since the last cycle stand in the way of (Alg. 2, line 16)."""
+    count = work.closest.size
+    if known_before >= count:
+        return
+    for i in range(1, size):
+        a, b = work.nodes[work.nodes[i].parent].state, work.nodes[i].state
+        for j in range(known_before, count):
+            o = 4 * j
+            distance = swept_distance(
+                a[0],
+                a[1],
+                a[2],
+                b[0],
+                b[1],
+                b[2],
+                work.obstacles[o],
+                work.obstacles[o + 1],
+                work.obstacles[o + 2],
+                work.obstacles[o + 3],
+            )
+            if distance - radius < margin - _BEND:
+                work.nodes[i].dead = 1
+    prune_orphans(work.nodes, size)
+
+
+@inlined
+def best_node(work, size):
+    """Return the end of the best path: least time at the goal, else least time-to-go among safe nodes; -1 if none."""
+    best, least = -1, np.inf
+    fallback, fallback_least = -1, np.inf
+    for i in range(1, size):
+        n = work.nodes[i]
+        if n.dead:
+            continue
+        score = n.time - 1e6 if n.goal else n.to_go + 0.05 * n.time
+        if n.unsafe and not n.goal:
+            if score < fallback_least:
+                fallback, fallback_least = i, score
+        elif score < least:
+            best, least = i, score
+    return best if best >= 0 else fallback
+
+
+@inlined
+def re_propagate(work, values, goal, speeds, end, settings, ticks):
+    """Propagate the path to node `end` again from the root; return its first node, or minus the node that fails."""
+    depth = 0
+    i = end
+    while i > 0:
+        work.path[depth] = i
+        depth += 1
+        i = work.nodes[i].parent
+    period = ticks * TICK
+    for k in range(depth - 1, -1, -1):
+        i = work.path[k]
+        n = work.nodes[i]
+        r = n.reference
+        may_cross = n.kind == CROSSING or work.nodes[n.parent].kind == CROSSING
+        r0, r1, r2, r3 = r[0], r[1], r[2], r[3]
+        kept_next, kept_unsafe, kept_tried = n.next, n.unsafe, n.tried
+        # edges were grown with the full margin; half of it allows for obstacles seen since
+        result = edge(work, values, goal, n.parent, i, r0, r1, r2, r3, 0.5 * settings.margin, ticks, may_cross)
+        if result == BLOCKED:
+            return -i
+        adopt(work, goal, speeds, n.parent, i, n.kind, result == ARRIVED, period)
+        n.next, n.unsafe, n.tried = kept_next, kept_unsafe, kept_tried
+    return work.path[depth - 1]
+
+
+@inlined
+def sensed(work, slot, origin, reach):
+    """Whether a node lies in space sensed from the vehicle's position: nothing unknown can be in the way there."""
+    s, o = work.nodes[slot].state, work.nodes[origin].state
+    dx, dy, dz = s[0] - o[0], s[1] - o[1], s[2] - o[2]
+    return dx * dx + dy * dy + dz * dz <= reach * reach
+
+
+@inlined
+def verify_stop(work, values, goal, first, settings, ticks, model, scratch):
+    """Check that node `first` can be followed to rest in known free space; write the references to `backup`.
+
+    An open or settling node stops by hovering; inside a crossing the stop is the rest of the crossing, then hovering.
+    Returns the number of references, 0 if the stop fails.
+    """
+    reach = model.world.sensor_range - model.vehicle.radius
+    if not sensed(work, first, 0, reach):
+        return 0
+    if work.nodes[first].goal:
+        return 1
+    copy_node(work.nodes, first, scratch)
+    node, count = first, 0
+    while work.nodes[node].kind == CROSSING:
+        node = work.nodes[node].next
+        r = work.nodes[node].reference
+        r0, r1, r2, r3 = r[0], r[1], r[2], r[3]
+        if edge(work, values, goal, scratch, scratch, r0, r1, r2, r3, settings.rest_margin, ticks, True) == BLOCKED:
+            return 0
+        if not sensed(work, scratch, 0, reach) or count >= BACKUP - 1:
+            return 0
+        for c in range(4):
+            work.backup[count, c] = work.nodes[scratch].reference[c]
+        count += 1
+    rx, ry, rz, psi = hover_reference(work.nodes[scratch], model)
+    for _ in range(settings.look_ahead):
+        result = edge(work, values, goal, scratch, scratch, rx, ry, rz, psi, settings.rest_margin, ticks, False)
+        if result == BLOCKED or not sensed(work, scratch, 0, reach):
+            return 0
+        if result == ARRIVED:
+            break
+    for c in range(4):
+        work.backup[count, c] = work.nodes[scratch].reference[c]
+    return count + 1
+
+
+@inlined
+def choose(work, values, goal, size, settings, ticks, model, speeds, scratch):
+    """Choose, re-propagate and verify until a path's first edge may be sent (Alg. 2, lines 10-18).
+
+    Returns (first node of the path or -1, length of its backup).
+    """
+    for _ in range(size):
+        end = best_node(work, size)
+        if end < 0:
+            break
+        first = re_propagate(work, values, goal, speeds, end, settings, ticks)
+        if first < 0:
+            work.nodes[-first].dead = 1
+            prune_orphans(work.nodes, size)
+            continue
+        stop = verify_stop(work, values, goal, first, settings, ticks, model, scratch)
+        if stop > 0:
+            return first, stop
+        work.nodes[first].dead = 1
+        prune_orphans(work.nodes, size)
+    return -1, 0
+
+
+@kernel
+def cycle(work, values, goal, now, size, root, known_before, draws, iterations, settings, ticks, begin, finish):
+    """Run one cycle, or a part of one.
+
+    Args:
+        work: `Workspace`; changed in place.
+        values: packed `Model`.
+        goal: (3,) m.
+        now: (20,) observed state, controller memory, reference in force.
+        size: nodes in use.
+        root: predicted node to root the tree at, -1 to begin a new tree.
+        known_before: obstacles the tree was grown with.
+        draws: uniform numbers for `expand_tree`.
+        iterations: samples to grow by.
+        settings: `SettingParams`.
+        ticks: ticks a period.
+        begin, finish: whether this part takes in the observation, and whether it chooses.
+
+    Returns:
+        (size, first, stop): nodes in use, the node to send (-1: use the backup), references in its backup.
+    """
+    model = unpack_model(values)
+    speeds = cruise_speeds(model)
+    if begin:
+        size = take_root(work, size, goal, speeds, now, root)
+        prune_blocked(work, size, known_before, model.vehicle.radius, settings.margin)
+    size = expand_tree(work, values, goal, size, draws, iterations, settings, ticks)
+    first, stop = -1, 0
+    if finish:
+        scratch = work.nodes.size - 1
+        first, stop = choose(work, values, goal, size, settings, ticks, model, speeds, scratch)
+    return size, first, stop

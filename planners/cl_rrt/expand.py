@@ -1,0 +1,201 @@
+"""Algorithm 1: expand the tree."""
+
+import numpy as np
+
+from hydrone_gym._jit import inlined, routine
+from hydrone_gym.physics.trigonometry import sincos
+from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.simulation.time_to_go import cruise_speeds, time_to_go
+from planners.cl_rrt.crossing import cross, facing
+from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
+from planners.cl_rrt.references import AIR_GATE, WATER_GATE, air_reference, water_reference
+from planners.cl_rrt.tree import OPEN
+
+DRAWS = 6  # uniform numbers a sample
+_GOAL_EXTENSION = 60  # edges: a try at the goal may go all the way
+_AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
+_AROUND_SHARE = 0.7
+_WALL = 0.5  # m: samples keep this far from the walls
+_AIR_REACHED = 0.4  # m
+_WATER_REACHED = 0.5  # m: more than the hold radius
+
+
+@inlined
+def between(u, low, high):
+    """Map a uniform number to an interval."""
+    return low + u * (high - low)
+
+
+@inlined
+def draw_point(draws, k, root, goal, air, model):
+    """Sample a point of one medium outside the zone, mostly around root and goal (Alg. 1, line 1)."""
+    w = model.world
+    near = draws[k + 2] < _AROUND_SHARE
+    x_low = max(w.x_min + _WALL, min(root.state[0], goal[0]) - _AROUND) if near else w.x_min + _WALL
+    x_high = min(w.x_max - _WALL, max(root.state[0], goal[0]) + _AROUND) if near else w.x_max - _WALL
+    y_low = max(w.y_min + _WALL, min(root.state[1], goal[1]) - _AROUND) if near else w.y_min + _WALL
+    y_high = min(w.y_max - _WALL, max(root.state[1], goal[1]) + _AROUND) if near else w.y_max - _WALL
+    x = between(draws[k + 3], x_low, x_high)
+    y = between(draws[k + 4], y_low, y_high)
+    z = between(draws[k + 5], AIR_GATE, w.z_max - _WALL) if air else between(
+        draws[k + 5], w.z_min + _WALL, -WATER_GATE
+    )
+    return x, y, z
+
+
+@inlined
+def draw_column(draws, k, root, goal, settings, model):
+    """Sample a crossing column near the water-side end; the point lies at the goal's height on the far side."""
+    w = model.world
+    from_air = root.state[2] > 0.0
+    cx = goal[0] if from_air else root.state[0]
+    cy = goal[1] if from_air else root.state[1]
+    sine, cosine = sincos(between(draws[k + 3], -np.pi, np.pi))
+    radius = settings.column_radius * draws[k + 4]
+    x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
+    y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
+    return x, y, goal[2]
+
+
+@inlined
+def next_node(work, size, x, y, z, to_goal, from_air, any_medium, by_cost, stamp, speeds):
+    """Return the best untried open node for a point, or -1: nearest, or least cost-to-come plus time (sorted order)."""
+    best, least = -1, np.inf
+    speed = speeds.air if from_air else speeds.water
+    for i in range(size):
+        n = work.nodes[i]
+        if n.dead or n.kind != OPEN or n.goal or work.path[i] == stamp:
+            continue
+        if to_goal:
+            if n.tried:
+                continue
+            score = n.to_go + (n.time if by_cost else 0.0)
+        else:
+            if not any_medium and (n.state[2] > 0.0) != from_air:
+                continue
+            dx, dy, dz = n.state[0] - x, n.state[1] - y, n.state[2] - z
+            score = np.sqrt(dx * dx + dy * dy + dz * dz) / speed + (n.time if by_cost else 0.0)
+        if score < least:
+            best, least = i, score
+    return best
+
+
+@routine
+def extend(work, values, goal, source, size, x, y, z, limit, margin, ticks):
+    """Connect a node to a sample by edges of one period, crossing if the media differ (Alg. 1, lines 3-17).
+
+    Returns the new size. Nodes of an extension that runs into something are kept and marked unsafe.
+    """
+    model = unpack_model(values)
+    speeds = cruise_speeds(model)
+    period = ticks * TICK
+    current, first = source, size
+    for _ in range(limit):
+        if size >= work.path.size - 1:
+            break
+        node = work.nodes[current]
+        air = node.state[2] > 0.0
+        change = air != (z > 0.0)
+        aim_z = (AIR_GATE if air else -WATER_GATE) if change else z
+        dx, dy, dz = x - node.state[0], y - node.state[1], aim_z - node.state[2]
+        across2 = dx * dx + dy * dy
+        if change:
+            speed = np.sqrt(node.state[6] * node.state[6] + node.state[7] * node.state[7])
+            near = (0.3 + 0.45 * speed) if air else _WATER_REACHED
+            if across2 < near * near and abs(dz) < 0.7:
+                grown = cross(work, values, goal, current, size, x, y, margin, ticks)
+                if grown == size:
+                    break
+                size = grown
+                current = size - 1
+                if work.nodes[current].goal:
+                    break
+                continue
+        else:
+            near = _AIR_REACHED if air else _WATER_REACHED
+            if across2 + dz * dz < near * near:
+                break
+        if air:
+            psi = facing(x, y, goal[0], goal[1], node.reference[3]) if goal[2] < 0.0 else node.reference[3]
+            rx, ry, rz, psi = air_reference(node, x, y, aim_z, psi, model, period)
+        else:
+            rx, ry, rz, psi = water_reference(node, x, y, aim_z, speeds, model, period)
+        result = edge(work, values, goal, current, size, rx, ry, rz, psi, margin, ticks, False)
+        if result == BLOCKED:
+            for i in range(first, size):
+                work.nodes[i].unsafe = 1
+            break
+        adopt(work, goal, speeds, current, size, OPEN, result == ARRIVED, period)
+        current = size
+        size += 1
+        if result == ARRIVED:
+            break
+    return size
+
+
+@inlined
+def least_time(work, size):
+    """Return the least time of a node at the goal, infinite if there is none."""
+    least = np.inf
+    for i in range(size):
+        if work.nodes[i].goal and not work.nodes[i].dead:
+            least = min(least, work.nodes[i].time)
+    return least
+
+
+@routine
+def expand_tree(work, values, goal, size, draws, iterations, settings, ticks):
+    """Expand the tree by a number of samples (Alg. 1); return its new size.
+
+    Args:
+        work: `Workspace`.
+        values: packed `Model`.
+        goal: (3,) m.
+        size: nodes in use.
+        draws: (iterations * DRAWS,) uniform numbers.
+        iterations: samples.
+        settings: `SettingParams`.
+        ticks: ticks a period.
+    """
+    model = unpack_model(values)
+    speeds = cruise_speeds(model)
+    root = work.nodes[0]
+    change = (root.state[2] > 0.0) != (goal[2] > 0.0)
+    for i in range(work.path.size):
+        work.path[i] = -1
+    best = least_time(work, size)
+    for iteration in range(iterations):
+        k = iteration * DRAWS
+        kind, by_cost = draws[k], draws[k + 1] < 0.5
+        to_goal = kind < settings.goal_bias
+        column = not to_goal and change and kind < settings.goal_bias + settings.column_bias
+        if to_goal:
+            x, y, z = goal[0], goal[1], goal[2]
+            from_air = z > 0.0
+        elif column:
+            x, y, z = draw_column(draws, k, root, goal, settings, model)
+            from_air = not z > 0.0
+        else:
+            air = (goal[2] > 0.0) if not change else draws[k + 1] * 2.0 % 1.0 < 0.5
+            x, y, z = draw_point(draws, k, root, goal, air, model)
+            from_air = air
+        beyond = time_to_go(x, y, z, goal[0], goal[1], goal[2], speeds)
+        for _ in range(settings.tries):
+            i = next_node(work, size, x, y, z, to_goal, from_air, False, by_cost, iteration, speeds)
+            if i < 0:
+                break
+            work.path[i] = iteration
+            n = work.nodes[i]
+            n.tried = 1 if to_goal else n.tried
+            # a sample that cannot beat the best path, even in an empty world, is not worth an edge
+            if n.time + time_to_go(n.state[0], n.state[1], n.state[2], x, y, z, speeds) + beyond >= best:
+                continue
+            limit = _GOAL_EXTENSION if to_goal else settings.extension
+            grown = extend(work, values, goal, i, size, x, y, z, limit, settings.margin, ticks)
+            if grown > size:
+                size = grown
+                if work.nodes[size - 1].goal:
+                    best = min(best, work.nodes[size - 1].time)
+                break
+    return size

@@ -1,0 +1,69 @@
+"""Settings of the CL-RRT, checked once and flattened for the kernels."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class SettingParams(NamedTuple):
+    """`CLRRTSettings` as the kernels read it."""
+
+    goal_bias: float
+    column_bias: float
+    column_radius: float
+    margin: float
+    rest_margin: float
+    tries: int
+    extension: int
+    look_ahead: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class CLRRTSettings:
+    """What a user may tune.
+
+    Attributes:
+        goal_bias: share of samples that are the goal.
+        column_bias: share of samples that are crossing columns, while the mission must still change medium.
+        column_radius: columns are sampled within this distance of the water-side end, m.
+        margin: clearance that planned edges keep, m.
+        rest_margin: clearance that the verified stop keeps, m.
+        tries: nodes tried in sorted order for one sample.
+        extension: longest extension toward one sample, edges.
+        look_ahead: periods that a stop is simulated for.
+        max_nodes: size of the tree.
+
+    Raises:
+        ValueError: a value out of range, named.
+    """
+
+    goal_bias: float = 0.25
+    column_bias: float = 0.35
+    column_radius: float = 5.0
+    margin: float = 0.12
+    rest_margin: float = 0.03
+    tries: int = 3
+    extension: int = 12
+    look_ahead: int = 9
+    max_nodes: int = 2000
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for spec in dataclasses.fields(self):
+            value = getattr(self, spec.name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < 0:
+                raise ValueError(f"CLRRTSettings.{spec.name} must be a number that is not negative, got {value!r}")
+        if self.goal_bias + self.column_bias > 1:
+            raise ValueError(
+                "CLRRTSettings.goal_bias + column_bias must not exceed 1, "
+                f"got {self.goal_bias!r} + {self.column_bias!r}"
+            )
+        for name, least in (("tries", 1), ("extension", 1), ("look_ahead", 8), ("max_nodes", 100)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise ValueError(f"CLRRTSettings.{name} must be a whole number of at least {least}, got {value!r}")
+
+    def params(self) -> SettingParams:
+        """Flatten for the kernels."""
+        return SettingParams(*(getattr(self, name) for name in SettingParams._fields))
