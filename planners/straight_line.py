@@ -12,6 +12,7 @@ from planners.policy import Known, PlannerPolicy, simulation_of
 
 COLUMN_RADIUS = 0.2  # m: how far from the column's axis a water entry may begin
 REST_SPEED = 0.1  # m/s: lateral speed below which a water entry may begin
+BRAKING = 2.8  # m: from here on the reference in air is the end of the leg itself, which the control law stops at
 SWIM_LEAD = 1.4  # m: the reference under water, ahead of the vehicle; the surge thrust saturates from 1.1 m on
 
 
@@ -61,8 +62,13 @@ class StraightLine(PlannerPolicy):
         return self._ahead(position, np.array([goal[0], goal[1], self._gate]), heading)
 
     def _ahead(self, position: NDArray[np.float64], aim: NDArray[np.float64], heading: float) -> NDArray[np.float64]:
-        """Point one period of cruising ahead on the way to `aim`: within both speed limits, so the path is straight."""
+        """Point one period of cruising ahead on the way to `aim`, or `aim` itself when it is near.
+
+        Within both speed limits, so that the path is straight; from `BRAKING` on the law's own limits slow it down.
+        """
         offset = aim - position
+        if np.linalg.norm(offset) < BRAKING:
+            return np.append(aim, heading)
         share = max(math.hypot(offset[0], offset[1]) / self._cruise, abs(offset[2]) / self._climb, 1.0)
         return np.append(position + offset / share, heading)
 

@@ -3,39 +3,36 @@
 import copy
 import inspect
 import math
-import os
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.envs.info import crossings_of, info_of
 from hydrone_gym.envs.options import Options
+from hydrone_gym.envs.requests import check_scenario, load_reference, requested_scenario
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.snapshot import Snapshot
 from hydrone_gym.envs.spaces import action_space, observation_space
-from hydrone_gym.envs.task import REPORT, copy_episodes, new_episodes, settle
-from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS
+from hydrone_gym.envs.task import REPORT, copy_episodes, new_episodes, pack_task, settle
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import TICK, Simulation, row_at
+from hydrone_gym.simulation.simulation import Simulation, row_at
 from hydrone_gym.vehicle import Vehicle, named_vehicle
 from hydrone_gym.world.generator import generate
-from hydrone_gym.world.scenario import Scenario, load_scenario, validate
+from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
 
 Observation = dict[str, NDArray[np.float64]]
 
-_OUTCOMES = tuple(Outcome)
 
-
-class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
+class HydroneEnv(gym.Env[Any, Any]):
     """A hybrid quadrotor flies, dives and swims to its goal among spheres it only sees from near.
 
     ## Description
-    The HyDrone lives in a box of 20 x 20 x 15 m, air above z = 0 and water below. It starts at rest and has to reach the
-    goal within 0.5 m, without touching a sphere and without crossing the surface roughly. A step is one period: the
+    The HyDrone lives in a box of 20 x 20 x 15 m, air above z = 0 and water below. It starts at rest and has to reach
+    the goal within 0.5 m, without touching a sphere and without crossing the surface roughly. A step is one period: the
     reference moves on a straight line from where it was to the action, and the paper's control laws follow it at
     100 Hz. Inside the transition zone, abs(z) <= 0.8 m, `vertical_mode` holds the vehicle still laterally, and in air
     it does not descend before it is nearly at rest. World frame: x, y horizontal, z up; SI units.
@@ -56,11 +53,11 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     | key | shape | content |
     |---|---|---|
-    | `state` | (12,) | position (m), ZXY Euler angles phi, theta, psi (rad), velocity (m/s, world), angular velocity (rad/s, body) |
+    | `state` | (12,) | position (m), Euler angles phi, theta, psi (rad, ZXY), velocity (m/s), body rates (rad/s) |
     | `integral` | (4,) | the controller's memory: altitude, roll, pitch, yaw (rpm in air, N in water) |
     | `reference` | (4,) | the reference now in force (m, m, m, rad) |
     | `goal` | (3,) | m |
-    | `obstacles` | (num_obstacles, 4) | `[x, y, z, r]` (m) of the spheres detected so far, in order of detection; zero rows after |
+    | `obstacles` | (num_obstacles, 4) | `[x, y, z, r]` (m) of the spheres detected so far, in order; zero rows after |
 
     A sphere is detected once its surface has been within `sensor_range` of the vehicle's centre.
 
@@ -81,11 +78,12 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
     `reset(options={"scenario": scenario})` flies a given `Scenario`, or the file it was saved to.
 
     ## Episode End
-    Terminated, by `info["outcome"]`: GOAL; COLLISION (the vehicle's sphere touches an obstacle); OUT_OF_BOUNDS (its centre
-    leaves the box); ROUGH_TRANSITION (a crossing with lateral speed above 0.2 m/s or tilt above 5 degrees, unless
-    `rough_transition="count"`); DIVERGED (the model's limits of speed, turning rate or tilt). These are judged every
-    0.05 s, and the observation is that of the instant. Truncated: TIMEOUT, at the end of the period in which `time_limit`
-    is reached. The environment does this itself; the ids are registered without `max_episode_steps`.
+    Terminated, by `info["outcome"]`: GOAL; COLLISION (the vehicle's sphere touches an obstacle); OUT_OF_BOUNDS (its
+    centre leaves the box); ROUGH_TRANSITION (a crossing with lateral speed above 0.2 m/s or tilt above 5 degrees,
+    unless `rough_transition="count"`); DIVERGED (beyond the limits of speed, turning rate or tilt the model is good
+    for). These are judged every 0.05 s, and the last observation is of that instant. Truncated: TIMEOUT, at the end of
+    the period in which `time_limit` is reached. The environment does this itself; the ids are registered without
+    `max_episode_steps`.
 
     `info` holds `outcome`, `time` (s), `energy` (J, of the rotors' shafts), `clearance` (least so far this episode, m;
     infinite without obstacles), `transitions` (a dict for each crossing: `time` (s), `direction` "entry" or "exit",
@@ -113,7 +111,7 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 2}
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 2}
 
     def __init__(
         self,
@@ -151,12 +149,15 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
         )
         self._simulation = Simulation(self.options.vehicle, self.options.world, period, lanes=1)
         self.action_space = action_space(self.world)
-        self.observation_space = observation_space(self.vehicle, self.world, self.options.num_obstacles)
+        space = observation_space(self.vehicle, self.world, self.options.num_obstacles)
+        self.observation_space = space
+        self._sphere_space: Any = space["obstacles"]
         self._lowest = self.action_space.low.astype(np.float64)
         self._highest = self.action_space.high.astype(np.float64)
+        self._law = self.options.law
         self._reference = np.zeros((1, 4))
         self._report = np.zeros((1, len(REPORT)))
-        self._time_limit_ticks = math.ceil(time_limit / TICK - 1e-9)
+        self._task = pack_task(self.vehicle, self.world, time_limit)
         self._episodes = new_episodes(1, self.options.num_obstacles, lanes=1)
         self._scenario: Scenario | None = None
         self._transitions: list[dict[str, Any]] = []
@@ -197,36 +198,13 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
             ValueError: an unknown key, or a scenario that is impossible in this world.
         """
         super().reset(seed=seed)
-        given = dict(options or {})
-        chosen = given.pop("scenario", None)
-        if given:
-            raise ValueError(f"unknown reset option {', '.join(map(repr, given))}; known are 'scenario'")
-        if chosen is None:
-            scenario = generate(self.options.law, self.world, self.vehicle.radius, self.np_random)
+        scenario = requested_scenario(options)
+        if scenario is None:
+            scenario = generate(self._law, self.world, self.vehicle.radius, self.np_random)
         else:
-            scenario = self._checked(chosen)
+            check_scenario(scenario, self.world, self.vehicle.radius, self._sphere_space)
         self._begin(scenario)
-        return self._observation(), self._info(self._report[0].tolist())
-
-    def _checked(self, chosen: Scenario | str | os.PathLike) -> Scenario:
-        """Return a scenario or load it, and check that this environment can fly it."""
-        if isinstance(chosen, str | os.PathLike):
-            chosen = load_scenario(Path(chosen))
-        if not isinstance(chosen, Scenario):
-            raise ValueError(f"scenario must be a Scenario or the path of its file, got {type(chosen).__name__}")
-        validate(chosen, self.world, self.vehicle.radius)
-        most = self.options.num_obstacles
-        if len(chosen.obstacles) > most:
-            raise ValueError(
-                f"scenario must have at most num_obstacles={most} obstacles, got {len(chosen.obstacles)}: "
-                "make the environment with more"
-            )
-        bounds: Any = self.observation_space["obstacles"]
-        for index, sphere in enumerate(chosen.obstacles):
-            if (sphere < bounds.low[index]).any() or (sphere > bounds.high[index]).any():
-                low, high = bounds.low[index].tolist(), bounds.high[index].tolist()
-                raise ValueError(f"obstacle {index} must lie between {low} and {high} (m), got {sphere.tolist()}")
-        return chosen
+        return self._observation(), info_of(self._report[0].tolist(), self._transitions)
 
     def _begin(self, scenario: Scenario) -> None:
         """Put the vehicle at the start of a scenario, with nothing known but what is in range there."""
@@ -244,9 +222,7 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._settle(True)
 
     def _settle(self, starting: bool) -> None:
-        count = len(self.scenario.obstacles)
-        limit = self._time_limit_ticks
-        settle(*self._episodes, count, 1, self._simulation.values, limit, 0, 1, starting, self._report)
+        settle(*self._episodes, len(self.scenario.obstacles), 1, self._task, 0, 1, starting, self._report)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period with the reference moving to the action.
@@ -267,40 +243,20 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
         if now.rows["outcome"][0] != Outcome.RUNNING:
             ended = Outcome(int(now.rows["outcome"][0])).name
             raise ResetNeeded(f"step() was called after the episode ended with {ended}: call reset() first")
-        self._load_reference(action)
+        load_reference(action, self._lowest, self._highest, self._reference[0])
         count = len(self._scenario.obstacles)
         self._simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
         self._settle(False)
         report = self._report[0].tolist()
         if report[-1] > 0.0:
-            self._note_crossings(int(report[-1]))
-        info = self._info(report)
+            self._transitions += crossings_of(now.rows["crossing_log"][0], int(report[-1]))
+        info = info_of(report, self._transitions)
         outcome = info["outcome"]
         truncated = outcome is Outcome.TIMEOUT
         terminated = outcome is not Outcome.RUNNING and not truncated
         if terminated or truncated:
             info["is_success"] = outcome is Outcome.GOAL
         return self._observation(), report[len(TERMS)], terminated, truncated, info
-
-    def _load_reference(self, action: ArrayLike) -> None:
-        """Check an action and clip it to the action space."""
-        try:
-            reference = np.asarray(action, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ValueError(f"action must be four numbers [x, y, z, psi] (m, m, m, rad), got {action!r}") from None
-        if reference.shape != (4,):
-            raise ValueError(f"action must have shape (4,) [x, y, z, psi] (m, m, m, rad), got {reference.shape}")
-        if not all(map(math.isfinite, reference.tolist())):
-            raise ValueError(f"action must be finite [x, y, z, psi] (m, m, m, rad), got {reference}")
-        np.maximum(reference, self._lowest, out=self._reference[0])
-        np.minimum(self._reference[0], self._highest, out=self._reference[0])
-
-    def _note_crossings(self, crossings: int) -> None:
-        """Append this period's crossings, from the row's log."""
-        for entry in self._episodes.rows["crossing_log"][0, : min(crossings, LOGGED_CROSSINGS)].tolist():
-            crossing: dict[str, Any] = dict(zip(CROSSING_FIELDS, entry, strict=True))
-            crossing["direction"] = "exit" if crossing["direction"] > 0.0 else "entry"
-            self._transitions.append(crossing)
 
     def _observation(self) -> Observation:
         rows = self._episodes.rows
@@ -310,18 +266,6 @@ class HydroneEnv(gym.Env[Observation, NDArray[np.float32]]):
             "reference": rows["reference"][0].copy(),
             "goal": rows["goal"][0].copy(),
             "obstacles": self._episodes.known[0].copy(),
-        }
-
-    def _info(self, report: list[float]) -> dict[str, Any]:
-        """What `info` always holds, from one row of `REPORT`; at reset the reward terms are null."""
-        terms = len(TERMS)
-        return {
-            "outcome": _OUTCOMES[int(report[terms + 1])],
-            "time": report[terms + 2],
-            "energy": report[terms + 3],
-            "clearance": report[terms + 4],
-            "transitions": [dict(crossing) for crossing in self._transitions],
-            "reward_terms": dict(zip(TERMS, report)),
         }
 
     def get_state(self) -> Snapshot:

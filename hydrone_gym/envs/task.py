@@ -1,19 +1,23 @@
 """The task around the simulation, for any number of rows: what is known at the start, and how a period is judged."""
 
-from typing import NamedTuple
+import math
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.envs.reward import TERMS, write_reward
+from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.simulation.advance import TICK
-from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
 from hydrone_gym.simulation.rows import new_rows
-from hydrone_gym.simulation.time_to_go import cruise_speeds, time_to_go
+from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
+from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.obstacles import swept_distance
 from hydrone_gym.world.sensing import detect
+from hydrone_gym.world.world import World
 
 # What `judge` reports of each row, one column each.
 REPORT = (*TERMS, "reward", "outcome", "time", "energy", "clearance", "crossings")
@@ -48,7 +52,33 @@ def new_episodes(count: int, obstacles: int, lanes: int) -> Episodes:
 
 def copy_episodes(episodes: Episodes) -> Episodes:
     """Return a copy that shares no memory."""
-    return Episodes(*(array.copy() for array in episodes))
+    return Episodes._make(array.copy() for array in episodes)
+
+
+class TaskParams(NamedTuple):
+    """The constants of a task; far fewer than a `Model`, which would add a second to the first compilation."""
+
+    radius: float  # m
+    sensor_range: float  # m
+    limit: float  # ticks after which a running episode times out
+    speeds: CruiseSpeeds
+
+
+def pack_task(vehicle: Vehicle, world: World, time_limit: float) -> NDArray[np.float64]:
+    """Flatten the constants of a task with a time limit in s to one array, which reaches a kernel fastest."""
+    compiled: Any = cruise_speeds
+    model = SimpleNamespace(
+        vehicle=vehicle_params(vehicle), air_gains=vehicle.air_gains, water_gains=vehicle.water_gains
+    )
+    speeds = compiled.py_func(model)
+    return np.array([vehicle.radius, world.sensor_range, math.ceil(time_limit / TICK - 1e-9), *speeds])
+
+
+@inlined
+def _unpack_task(values):
+    """Rebuild the `TaskParams` of a packed array inside a kernel."""
+    speeds = CruiseSpeeds(values[3], values[4], values[5], values[6], values[7])
+    return TaskParams(values[0], values[1], values[2], speeds)
 
 
 @inlined
@@ -59,7 +89,7 @@ def _potential_of(row, speeds):
 
 
 @inlined
-def _begin(n, rows, obstacles, closest, potential, seen, found, known, lane, lanes, count, model, speeds):
+def _begin(n, rows, obstacles, closest, potential, seen, found, known, lane, lanes, count, params):
     """Begin row n's episode: distances, clearance, time-to-go and first detections at its start."""
     row = rows[n]
     x, y, z = row.state[0], row.state[1], row.state[2]
@@ -69,23 +99,23 @@ def _begin(n, rows, obstacles, closest, potential, seen, found, known, lane, lan
         centre = obstacles[k], obstacles[k + lanes], obstacles[k + 2 * lanes]
         distance = swept_distance(x, y, z, x, y, z, centre[0], centre[1], centre[2], obstacles[k + 3 * lanes])
         closest[j * lanes + lane] = distance
-        row.clearance = min(row.clearance, distance - model.vehicle.radius)
+        row.clearance = min(row.clearance, distance - params.radius)
         seen[n, j] = 0
     for k in range(known.shape[1]):
         for c in range(4):
             known[n, k, c] = 0.0
     found[n] = 0
-    potential[n] = _potential_of(row, speeds)
+    potential[n] = _potential_of(row, params.speeds)
 
 
 @inlined
-def _judge(n, rows, potential, limit, speeds, report):
+def _judge(n, rows, potential, params, report):
     """Judge row n after a period: time-out, reward, and what is reported."""
     row = rows[n]
-    if row.outcome == RUNNING and row.ticks >= limit:
+    if row.outcome == RUNNING and row.ticks >= params.limit:
         row.outcome = TIMEOUT
     s = row.state
-    after = _potential_of(row, speeds)
+    after = _potential_of(row, params.speeds)
     write_reward(report, n, potential[n], after, s[6], s[7], s[8], row.outcome)
     potential[n] = after
     report[n, _OUTCOME] = row.outcome
@@ -98,7 +128,7 @@ def _judge(n, rows, potential, limit, speeds, report):
 
 @kernel
 def settle(
-    rows, obstacles, closest, potential, seen, found, known, count, lanes, values, limit, first, last, starting, report
+    rows, obstacles, closest, potential, seen, found, known, count, lanes, values, first, last, starting, report
 ):
     """Settle rows [first, last) before their first period or after each: distances, reward, sensing, report.
 
@@ -106,20 +136,20 @@ def settle(
         rows, obstacles, closest, potential, seen, found, known: fields of `Episodes`, updated.
         count: number of obstacles.
         lanes: rows a block.
-        values: packed `Model`.
-        limit: ticks after which a running episode times out.
+        values: from `pack_task`.
         first, last: which rows.
         starting: True before the first period: the rows' states and goals and the obstacles are all that is read.
         report: (n, len(REPORT)) float64, written; the crossings counted are those of this period.
     """
-    model = unpack_model(values)
-    speeds = cruise_speeds(model)
-    reach = model.world.sensor_range
+    params = _unpack_task(values)
     for n in range(first, last):
         block, lane = n // lanes, n % lanes
         near = closest[block]
         spheres = obstacles[block]
         if starting:
-            _begin(n, rows, spheres, near, potential, seen, found, known, lane, lanes, count, model, speeds)
-        _judge(n, rows, potential, limit, speeds, report)
-        detect(spheres, near, lane, lanes, count, reach, n, seen, found, known)
+            _begin(n, rows, spheres, near, potential, seen, found, known, lane, lanes, count, params)
+        _judge(n, rows, potential, params, report)
+        if starting:
+            for term in range(_OUTCOME):  # nothing has been earned yet
+                report[n, term] = 0.0
+        detect(spheres, near, lane, lanes, count, params.sensor_range, n, seen, found, known)

@@ -95,10 +95,10 @@ def plot_tree(
         raise ValueError(f"edges must be (E, K, 3) with K >= 2 and in_air (E,), got {edges.shape} and {in_air.shape}")
     scene = Scene(lower, upper, azimuth=camera_azimuth(start, goal))
     scene.spheres(obstacles, style.DETECTED)
-    scene.lines(list(edges[in_air]), style.RED, 0.9, alpha=0.8)
-    scene.lines(list(edges[~in_air]), style.PURPLE, 0.9, alpha=0.9)
-    if solution is not None and len(solution) > 1:
-        scene.lines([np.asarray(solution)], style.BLACK, 2.2, hidden=0.5)
+    if solution is not None:  # beneath the branches, which keep their colour
+        scene.lines([np.asarray(solution)], style.BLACK, 4.5)
+    scene.lines(list(edges[in_air]), style.RED, 1.3)
+    scene.lines(list(edges[~in_air]), style.PURPLE, 1.6)
     scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
     scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
     entries: list[tuple[str, dict[str, object]]] = [
@@ -107,7 +107,7 @@ def plot_tree(
         ("obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}),
     ]
     if solution is not None:
-        entries.insert(2, ("chosen path", {"color": style.BLACK, "linewidth": 2.2}))
+        entries.insert(2, ("chosen path", {"color": style.BLACK, "linewidth": 4.5}))
     _legend(scene, title, entries)
     return scene.figure
 

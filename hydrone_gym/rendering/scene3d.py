@@ -15,6 +15,7 @@ from hydrone_gym.rendering import style
 from hydrone_gym.rendering.spheres import camera_axes, sphere_outlines
 
 if TYPE_CHECKING:
+    from matplotlib.collections import Collection
     from matplotlib.figure import Figure
 
 _UNDER, _SURFACE, _ABOVE, _TOP = 1000.0, 2000.0, 3000.0, 4000.0  # paint order
@@ -48,7 +49,7 @@ class Scene:
         self._reach = float(np.linalg.norm(self._upper - self._lower))
         with rc_context(style.FONTS):
             self.figure: Figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH)
-            self.axes = self.figure.add_axes((0.0, 0.03, 0.97, 1.0), projection="3d", computed_zorder=False)
+            self.axes = self.figure.add_axes((0.01, 0.09, 0.97, 0.89), projection="3d", computed_zorder=False)
         self.axes.set_proj_type("ortho")
         self.axes.view_init(elev=elevation, azim=azimuth)
         self._frame()
@@ -59,10 +60,10 @@ class Scene:
         ax = self.axes
         ax.set(xlim=(self._lower[0], self._upper[0]), ylim=(self._lower[1], self._upper[1]))
         ax.set_zlim(self._lower[2], self._upper[2])
-        ax.set_box_aspect(self._upper - self._lower, zoom=1.12)
+        ax.set_box_aspect(self._upper - self._lower, zoom=1.16)
         ax.set_xlabel("x (m)", labelpad=8)
         ax.set_ylabel("y (m)", labelpad=8)
-        ax.set_zlabel("z (m)", labelpad=4)
+        ax.set_zlabel("z (m)", labelpad=2)
         for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
             axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
             axis._axinfo["grid"].update(color=(0.88, 0.88, 0.88, 1.0), linewidth=0.6)
@@ -77,7 +78,12 @@ class Scene:
         face = _rgba(style.WATER, 0.30)
         plane = Poly3DCollection(corners, facecolors=[face], edgecolors=[_rgba(style.BLUE, 0.5)], linewidths=0.8)
         plane.set_zorder(_SURFACE)
-        self.axes.add_collection3d(plane, autolim=False)
+        self._add(plane)
+
+    def _add(self, collection: Collection) -> None:
+        """Add a collection; what reaches beyond the axes' rectangle is drawn too."""
+        collection.set_clip_on(False)
+        self.axes.add_collection3d(collection, autolim=False)
 
     def _order(self, point: NDArray[np.float64], above: bool) -> float:
         """Paint order of something at a point: nearer to the eye is later."""
@@ -107,7 +113,7 @@ class Scene:
         edges[0] = _rgba("#888888", alpha)
         ball = Poly3DCollection(polygons, facecolors=faces, edgecolors=edges, linewidths=0.5)
         ball.set_zorder(self._order(centre, above))
-        self.axes.add_collection3d(ball, autolim=False)
+        self._add(ball)
 
     def lines(
         self, polylines: list[NDArray[np.float64]], colour: str, width: float, alpha: float = 1.0, hidden: float = 0.0
@@ -126,12 +132,12 @@ class Scene:
             chosen = np.flatnonzero(slices == number)
             part = Line3DCollection([pieces[i] for i in chosen], colors=[_rgba(colour, alpha)], linewidths=width)
             part.set_capstyle("round")
-            part.set_zorder(float(order[chosen].mean()))
-            self.axes.add_collection3d(part, autolim=False)
+            part.set_zorder(number * (900.0 / _BINS))
+            self._add(part)
         if hidden > 0.0:
             ghost = Line3DCollection(polylines, colors=[_rgba(colour, hidden)], linewidths=0.6 * width)
             ghost.set_zorder(_TOP - 100.0)
-            self.axes.add_collection3d(ghost, autolim=False)
+            self._add(ghost)
 
     def mark(self, point: NDArray[np.float64], symbol: str, colour: str, size: float, label: str) -> None:
         """Add a mark at a point (3,) in m, never hidden; X and + are strokes, other symbols are filled discs."""

@@ -1,13 +1,15 @@
 """Shaded spheres as a few flat polygons: exact outlines under an orthographic camera, small files, crisp in print.
 
 A sphere lit from direction L is shaded by nested caps around L. Each cap, or the part of it above the water, is convex,
-so its picture is the convex hull of its projected rim. Six polygons a sphere replace the hundreds of a mesh.
+so its picture is the convex hull of its projected rim. Eight polygons a sphere replace the hundreds of a mesh.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-_CAPS = np.radians([52.0, 42.0, 33.0, 24.0, 14.0])  # half-angles of the lit caps, all in full view of the camera
+_CAPS = np.radians(
+    [52.0, 46.0, 40.0, 34.0, 28.0, 22.0, 15.0]
+)  # half-angles of the lit caps, all in full view of the camera
 _LIGHT = np.array([-0.35, 0.45, 0.82])  # in camera axes: right, up, towards the eye
 _RIM = 64  # points round an outline
 

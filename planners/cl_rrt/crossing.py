@@ -13,7 +13,7 @@ from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.time_to_go import cruise_speeds
 from hydrone_gym.world.obstacles import swept_distance
-from planners.cl_rrt.edge import ARRIVED, BLOCKED, FREE, adopt, edge
+from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, inside
 from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING
 
@@ -88,8 +88,8 @@ def cross(work, values, goal, source, size, sample_x, sample_y, margin, ticks):
         settled = slow and abs(n[2] - gate) < 0.2 and (not down or abs(wrap(n[5] - psi)) < _FACING)
         if settled or size >= work.path.size - 1:
             break
-        result = edge(work, values, goal, current, size, x, y, gate, psi, margin, ticks, False)
-        if result == BLOCKED:
+        result, crossed = edge(work, values, goal, current, size, x, y, gate, psi, margin, ticks)
+        if result == BLOCKED or crossed:
             return first
         adopt(work, goal, speeds, current, size, SETTLING, result == ARRIVED, period)
         work.nodes[size].next = size + 1
@@ -104,7 +104,7 @@ def cross(work, values, goal, source, size, sample_x, sample_y, margin, ticks):
     for _ in range(int(_CROSS_LIMIT / period)):
         if size >= work.path.size - 1:
             return first
-        result = edge(work, values, goal, current, size, x, y, beyond, psi, margin, ticks, True)
+        result, _ = edge(work, values, goal, current, size, x, y, beyond, psi, margin, ticks)
         if result == BLOCKED:
             return first
         z = work.nodes[size].state[2]
@@ -119,4 +119,3 @@ def cross(work, values, goal, source, size, sample_x, sample_y, margin, ticks):
     return first
 
 
-__all__ = ["FREE", "cross", "facing"]

@@ -19,13 +19,14 @@ CROSSING_COS_TILT = np.cos(np.radians(2.0))
 
 
 @routine
-def edge(work, values, goal, source, slot, rx, ry, rz, psi, margin, ticks, may_cross):
+def edge(work, values, goal, source, slot, rx, ry, rz, psi, margin, ticks):
     """Propagate node `source` over one period toward a reference and write the end to `slot`.
 
     References are rounded to single precision first, the precision of the action space, so that the environment gets
     the very numbers that were checked.
 
-    Returns BLOCKED (obstacle within `margin` m, bounds, rough or unplanned crossing, divergence), FREE or ARRIVED.
+    Returns (BLOCKED, FREE or ARRIVED, whether the surface was passed). BLOCKED: an obstacle within `margin` m, the
+    bounds, a rough crossing, or divergence.
     """
     model = unpack_model(values)
     b = work.block[0]
@@ -38,15 +39,16 @@ def edge(work, values, goal, source, slot, rx, ry, rz, psi, margin, ticks, may_c
     advance(work.block, work.log, work.obstacles, work.closest, count, model, 0, ticks, ticks)
     store_vehicle(b, 0, end.state, end.integral)
     end.reference[0], end.reference[1], end.reference[2], end.reference[3] = rx, ry, rz, psi
-    if b.clearance[0] < margin or (b.crossings[0] > 0.0 and not may_cross):
-        return BLOCKED
+    crossed = b.crossings[0] > 0.0
+    if b.clearance[0] < margin:
+        return BLOCKED, crossed
     for slot_index in range(min(int(b.crossings[0]), work.log.shape[1])):
         tilt_cosine = np.cos(work.log[0, slot_index, 3])
         if work.log[0, slot_index, 2] > CROSSING_SPEED or tilt_cosine < CROSSING_COS_TILT:
-            return BLOCKED
+            return BLOCKED, crossed
     if b.outcome[0] == GOAL:
-        return ARRIVED
-    return FREE if b.outcome[0] == RUNNING else BLOCKED
+        return ARRIVED, crossed
+    return FREE if b.outcome[0] == RUNNING else BLOCKED, crossed
 
 
 @inlined

@@ -17,6 +17,10 @@ from planners.cl_rrt.references import hover_reference
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, copy_node, prune_orphans, reroot
 
 _BEND = 0.1  # m: how far an edge may leave its chord
+_FULL = 0.8  # share of the tree's capacity
+_GIVE = 0.02  # m: how much nearer than now an edge may come when the vehicle is within the margin
+_LEAST_MARGIN = 0.005  # m
+_DRIFT_TIME = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
 
 
 @inlined
@@ -67,6 +71,39 @@ def prune_blocked(work, size, known_before, radius, margin):
 
 
 @inlined
+def clearance_between(work, a, b, radius):
+    """Least clearance (m) of the straight path between two points from every known obstacle."""
+    least = np.inf
+    for j in range(work.closest.size):
+        o = 4 * j
+        distance = swept_distance(
+            a[0],
+            a[1],
+            a[2],
+            b[0],
+            b[1],
+            b[2],
+            work.obstacles[o],
+            work.obstacles[o + 1],
+            work.obstacles[o + 2],
+            work.obstacles[o + 3],
+        )
+        least = min(least, distance - radius)
+    return least
+
+
+@inlined
+def margin_here(work, radius, settings):
+    """The margin edges keep this cycle: the full one, or what a vehicle already nearer to an obstacle has left.
+
+    Without this a vehicle that drifted or stopped within the margin could never move again.
+    """
+    state = work.nodes[0].state
+    left = clearance_between(work, state, state, radius) - _GIVE
+    return max(min(settings.margin, left), _LEAST_MARGIN)
+
+
+@inlined
 def best_node(work, size):
     """Return the end of the best path: least time at the goal, else least time-to-go among safe nodes; -1 if none."""
     best, least = -1, np.inf
@@ -85,7 +122,19 @@ def best_node(work, size):
 
 
 @inlined
-def re_propagate(work, values, goal, speeds, end, settings, ticks):
+def trim(work, size):
+    """Cut a tree that has filled up back to its best path, so that it can grow again; return its size."""
+    end = best_node(work, size)
+    for i in range(1, size):
+        work.nodes[i].dead = 1
+    while end > 0:
+        work.nodes[end].dead = 0
+        end = work.nodes[end].parent
+    return reroot(work.nodes, size, 0, work.path)
+
+
+@inlined
+def re_propagate(work, values, goal, speeds, end, margin, ticks):
     """Propagate the path to node `end` again from the root; return its first node, or minus the node that fails."""
     depth = 0
     i = end
@@ -102,8 +151,8 @@ def re_propagate(work, values, goal, speeds, end, settings, ticks):
         r0, r1, r2, r3 = r[0], r[1], r[2], r[3]
         kept_next, kept_unsafe, kept_tried = n.next, n.unsafe, n.tried
         # edges were grown with the full margin; half of it allows for obstacles seen since
-        result = edge(work, values, goal, n.parent, i, r0, r1, r2, r3, 0.5 * settings.margin, ticks, may_cross)
-        if result == BLOCKED:
+        result, crossed = edge(work, values, goal, n.parent, i, r0, r1, r2, r3, 0.5 * margin, ticks)
+        if result == BLOCKED or (crossed and not may_cross):
             return -i
         adopt(work, goal, speeds, n.parent, i, n.kind, result == ARRIVED, period)
         n.next, n.unsafe, n.tried = kept_next, kept_unsafe, kept_tried
@@ -119,11 +168,11 @@ def sensed(work, slot, origin, reach):
 
 
 @inlined
-def verify_stop(work, values, goal, first, settings, ticks, model, scratch):
+def verify_stop(work, values, goal, first, settings, margin, ticks, model, scratch):
     """Check that node `first` can be followed to rest in known free space; write the references to `backup`.
 
     An open or settling node stops by hovering; inside a crossing the stop is the rest of the crossing, then hovering.
-    Returns the number of references, 0 if the stop fails.
+    The clearance kept is `margin` (m). Returns the number of references, 0 if the stop fails.
     """
     reach = model.world.sensor_range - model.vehicle.radius
     if not sensed(work, first, 0, reach):
@@ -136,7 +185,8 @@ def verify_stop(work, values, goal, first, settings, ticks, model, scratch):
         node = work.nodes[node].next
         r = work.nodes[node].reference
         r0, r1, r2, r3 = r[0], r[1], r[2], r[3]
-        if edge(work, values, goal, scratch, scratch, r0, r1, r2, r3, settings.rest_margin, ticks, True) == BLOCKED:
+        result, _ = edge(work, values, goal, scratch, scratch, r0, r1, r2, r3, margin, ticks)
+        if result == BLOCKED:
             return 0
         if not sensed(work, scratch, 0, reach) or count >= BACKUP - 1:
             return 0
@@ -145,18 +195,23 @@ def verify_stop(work, values, goal, first, settings, ticks, model, scratch):
         count += 1
     rx, ry, rz, psi = hover_reference(work.nodes[scratch], model)
     for _ in range(settings.look_ahead):
-        result = edge(work, values, goal, scratch, scratch, rx, ry, rz, psi, settings.rest_margin, ticks, False)
-        if result == BLOCKED or not sensed(work, scratch, 0, reach):
+        result, crossed = edge(work, values, goal, scratch, scratch, rx, ry, rz, psi, margin, ticks)
+        if result == BLOCKED or crossed or not sensed(work, scratch, 0, reach):
             return 0
         if result == ARRIVED:
             break
+    end = work.nodes[scratch].state
+    if end[2] < 0.0:
+        drifted = (end[0] + _DRIFT_TIME * end[6], end[1] + _DRIFT_TIME * end[7], end[2])
+        if clearance_between(work, end, drifted, model.vehicle.radius) < margin:
+            return 0
     for c in range(4):
         work.backup[count, c] = work.nodes[scratch].reference[c]
     return count + 1
 
 
 @inlined
-def choose(work, values, goal, size, settings, ticks, model, speeds, scratch):
+def choose(work, values, goal, size, settings, margin, ticks, model, speeds, scratch):
     """Choose, re-propagate and verify until a path's first edge may be sent (Alg. 2, lines 10-18).
 
     Returns (first node of the path or -1, length of its backup).
@@ -165,12 +220,12 @@ def choose(work, values, goal, size, settings, ticks, model, speeds, scratch):
         end = best_node(work, size)
         if end < 0:
             break
-        first = re_propagate(work, values, goal, speeds, end, settings, ticks)
+        first = re_propagate(work, values, goal, speeds, end, margin, ticks)
         if first < 0:
             work.nodes[-first].dead = 1
             prune_orphans(work.nodes, size)
             continue
-        stop = verify_stop(work, values, goal, first, settings, ticks, model, scratch)
+        stop = verify_stop(work, values, goal, first, settings, min(margin, settings.rest_margin), ticks, model, scratch)
         if stop > 0:
             return first, stop
         work.nodes[first].dead = 1
@@ -179,7 +234,7 @@ def choose(work, values, goal, size, settings, ticks, model, speeds, scratch):
 
 
 @kernel
-def cycle(work, values, goal, now, size, root, known_before, draws, iterations, settings, ticks, begin, finish):
+def cycle(work, values, goal, now, size, root, known_before, draws, iterations, settings, roam, ticks, begin, finish):
     """Run one cycle, or a part of one.
 
     Args:
@@ -193,6 +248,7 @@ def cycle(work, values, goal, now, size, root, known_before, draws, iterations, 
         draws: uniform numbers for `expand_tree`.
         iterations: samples to grow by.
         settings: `SettingParams`.
+        roam: see `expand_tree`.
         ticks: ticks a period.
         begin, finish: whether this part takes in the observation, and whether it chooses.
 
@@ -203,10 +259,13 @@ def cycle(work, values, goal, now, size, root, known_before, draws, iterations, 
     speeds = cruise_speeds(model)
     if begin:
         size = take_root(work, size, goal, speeds, now, root)
-        prune_blocked(work, size, known_before, model.vehicle.radius, settings.margin)
-    size = expand_tree(work, values, goal, size, draws, iterations, settings, ticks)
+    margin = margin_here(work, model.vehicle.radius, settings)
+    if begin:
+        prune_blocked(work, size, known_before, model.vehicle.radius, margin)
+        size = trim(work, size) if size > _FULL * work.path.size else size
+    size = expand_tree(work, values, goal, size, draws, iterations, settings, margin, roam, ticks)
     first, stop = -1, 0
     if finish:
         scratch = work.nodes.size - 1
-        first, stop = choose(work, values, goal, size, settings, ticks, model, speeds, scratch)
+        first, stop = choose(work, values, goal, size, settings, margin, ticks, model, speeds, scratch)
     return size, first, stop

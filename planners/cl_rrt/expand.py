@@ -16,6 +16,7 @@ DRAWS = 6  # uniform numbers a sample
 _GOAL_EXTENSION = 60  # edges: a try at the goal may go all the way
 _AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
 _AROUND_SHARE = 0.7
+_ROAM_HEIGHT = 1.5  # m
 _WALL = 0.5  # m: samples keep this far from the walls
 _AIR_REACHED = 0.4  # m
 _WATER_REACHED = 0.5  # m: more than the hold radius
@@ -45,17 +46,22 @@ def draw_point(draws, k, root, goal, air, model):
 
 
 @inlined
-def draw_column(draws, k, root, goal, settings, model):
-    """Sample a crossing column near the water-side end; the point lies at the goal's height on the far side."""
+def draw_column(draws, k, root, goal, roam, settings, model):
+    """Sample a crossing column near the water-side end; the point lies at the goal's height on the far side.
+
+    Roaming, the columns lie around the root and the point just beyond the surface.
+    """
     w = model.world
     from_air = root.state[2] > 0.0
-    cx = goal[0] if from_air else root.state[0]
-    cy = goal[1] if from_air else root.state[1]
+    at_goal = from_air and roam == 0
+    cx = goal[0] if at_goal else root.state[0]
+    cy = goal[1] if at_goal else root.state[1]
     sine, cosine = sincos(between(draws[k + 3], -np.pi, np.pi))
     radius = settings.column_radius * draws[k + 4]
     x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
     y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
-    return x, y, goal[2]
+    z = -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT
+    return x, y, z if roam else goal[2]
 
 
 @inlined
@@ -121,10 +127,11 @@ def extend(work, values, goal, source, size, x, y, z, limit, margin, ticks):
             rx, ry, rz, psi = air_reference(node, x, y, aim_z, psi, model, period)
         else:
             rx, ry, rz, psi = water_reference(node, x, y, aim_z, speeds, model, period)
-        result = edge(work, values, goal, current, size, rx, ry, rz, psi, margin, ticks, False)
-        if result == BLOCKED:
+        result, crossed = edge(work, values, goal, current, size, rx, ry, rz, psi, margin, ticks)
+        if result == BLOCKED or crossed:
             for i in range(first, size):
                 work.nodes[i].unsafe = 1
+            work.nodes[source].unsafe = 1 if size == first else work.nodes[source].unsafe
             break
         adopt(work, goal, speeds, current, size, OPEN, result == ARRIVED, period)
         current = size
@@ -145,7 +152,7 @@ def least_time(work, size):
 
 
 @routine
-def expand_tree(work, values, goal, size, draws, iterations, settings, ticks):
+def expand_tree(work, values, goal, size, draws, iterations, settings, margin, roam, ticks):
     """Expand the tree by a number of samples (Alg. 1); return its new size.
 
     Args:
@@ -156,12 +163,15 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, ticks):
         draws: (iterations * DRAWS,) uniform numbers.
         iterations: samples.
         settings: `SettingParams`.
+        margin: clearance in m that edges keep.
+        roam: 1 to try crossings even if root and goal share a medium: the way out of a pocket may lead through the
+            other one.
         ticks: ticks a period.
     """
     model = unpack_model(values)
     speeds = cruise_speeds(model)
     root = work.nodes[0]
-    change = (root.state[2] > 0.0) != (goal[2] > 0.0)
+    change = roam != 0 or (root.state[2] > 0.0) != (goal[2] > 0.0)
     for i in range(work.path.size):
         work.path[i] = -1
     best = least_time(work, size)
@@ -174,7 +184,7 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, ticks):
             x, y, z = goal[0], goal[1], goal[2]
             from_air = z > 0.0
         elif column:
-            x, y, z = draw_column(draws, k, root, goal, settings, model)
+            x, y, z = draw_column(draws, k, root, goal, roam, settings, model)
             from_air = not z > 0.0
         else:
             air = (goal[2] > 0.0) if not change else draws[k + 1] * 2.0 % 1.0 < 0.5
@@ -192,7 +202,7 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, ticks):
             if n.time + time_to_go(n.state[0], n.state[1], n.state[2], x, y, z, speeds) + beyond >= best:
                 continue
             limit = _GOAL_EXTENSION if to_goal else settings.extension
-            grown = extend(work, values, goal, i, size, x, y, z, limit, settings.margin, ticks)
+            grown = extend(work, values, goal, i, size, x, y, z, limit, margin, ticks)
             if grown > size:
                 size = grown
                 if work.nodes[size - 1].goal:

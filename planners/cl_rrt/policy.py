@@ -16,7 +16,7 @@ from planners.policy import Known, PlannerPolicy, simulation_of
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
-_SPARE = 200  # nodes that must be free, or the tree is cut back to the best path
+_PATIENCE = 8  # cycles without a path before crossings are tried that the mission does not need
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Memory:
     backup: NDArray[np.float64]  # verified references that end in a stop
     stop: int  # how many of them
     cycle: int
-    edges: int = 0
+    waiting: int = 0  # cycles since a path was last sent
 
 
 class TreeView(NamedTuple):
@@ -117,8 +117,6 @@ class CLRRT(PlannerPolicy):
         root = memory.root
         if root >= 0 and np.abs(memory.nodes["state"][root][:3] - now.state[:3]).max() > _MOVED:
             root = -1
-        if memory.size > self.settings.max_nodes - _SPARE:
-            root = root if root >= 0 else -1
         size, begin, done = memory.size, True, False
         while not done:
             if self.time_budget is None:
@@ -137,6 +135,7 @@ class CLRRT(PlannerPolicy):
                 random.random(samples * DRAWS),
                 samples,
                 self._params,
+                int(memory.waiting >= _PATIENCE),
                 self.simulation.ticks,
                 begin,
                 done,
@@ -151,7 +150,7 @@ class CLRRT(PlannerPolicy):
         backup, stop = memory.backup, memory.stop
         if stop > 1:
             backup, stop = np.roll(backup, -1, axis=0), stop - 1
-        return reference, Memory(memory.nodes, 0, -1, 0, backup, stop, memory.cycle + 1)
+        return reference, Memory(memory.nodes, 0, -1, 0, backup, stop, memory.cycle + 1, memory.waiting + 1)
 
     def grow_tree(self, now: Known, iterations: int) -> TreeView:
         """Grow a tree from an observation without flying, as in the paper's Fig. 5."""
@@ -161,7 +160,7 @@ class CLRRT(PlannerPolicy):
         draws = np.random.default_rng(self.seed).random(iterations * DRAWS)
         values, ticks = self.simulation.values, self.simulation.ticks
         size, _, _ = cycle(
-            work, values, now.goal, observed, 0, -1, 0, draws, iterations, self._params, ticks, True, False
+            work, values, now.goal, observed, 0, -1, 0, draws, iterations, self._params, 0, ticks, True, False
         )
         nodes = work.nodes[:size]
         edges = np.stack([nodes["reference"][nodes["parent"][1:], :3], nodes["reference"][1:, :3]], axis=1)

@@ -59,6 +59,18 @@ def rotation(phi, theta, psi):
     return rz @ rx @ ry
 
 
+def skew(a):
+    """The matrix of a x ..."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def solve(matrix, right):
+    """Cramer's rule for three equations: the cross products of the rows are the columns of the adjugate."""
+    a, b, c = matrix[0], matrix[1], matrix[2]
+    bc, ca, ab = skew(b) @ c, skew(c) @ a, skew(a) @ b
+    return (bc * right[0] + ca * right[1] + ab * right[2]) / (a @ bc)
+
+
 def rate_matrix(phi, theta):
     """The printed matrix of eqs. 3 and 11: it maps Euler rates to body rates (E3)."""
     return np.array(
@@ -97,13 +109,13 @@ def derivative(state, rpm, m):
     seen = r.T @ velocity
     gravity_term = np.array([0.0, 0.0, (m.dry_mass - m.displaced) * m.gravity])
     acceleration = (r @ force - gravity_term - r @ (m.drag @ (np.abs(seen) * seen))) / m.total_mass
-    gyroscopic = np.cross(omega, m.inertia @ omega)
+    gyroscopic = skew(omega) @ (m.inertia @ omega)
     torque = moment - gyroscopic - restoring_moment(phi, theta, m) - m.rotational_drag @ (np.abs(omega) * omega)
     out = np.empty(12)
     out[0:3] = velocity
-    out[3:6] = np.linalg.solve(rate_matrix(phi, theta), omega)
+    out[3:6] = solve(rate_matrix(phi, theta), omega)
     out[6:9] = acceleration
-    out[9:12] = np.linalg.solve(m.total_inertia, torque)
+    out[9:12] = solve(m.total_inertia, torque)
     return out
 
 

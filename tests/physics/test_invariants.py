@@ -36,7 +36,7 @@ def without(vehicle: Vehicle, **changes) -> Vehicle:
 
 @VEHICLES
 @MEDIA
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(angles=angles, velocity=velocities)
 def test_translational_drag_takes_energy(vehicle, water, angles, velocity):
     """Kinetic energy with gravity's share taken out analytically: what is left is drag, at any attitude."""
@@ -52,7 +52,7 @@ def test_translational_drag_takes_energy(vehicle, water, angles, velocity):
 
 @VEHICLES
 @MEDIA
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(rates=rates)
 def test_rotational_drag_takes_energy_and_gyroscopic_terms_do_no_work(vehicle, water, rates):
     """Upright there is no restoring moment, so the power of every moment is the power of drag."""
@@ -67,7 +67,7 @@ def test_rotational_drag_takes_energy_and_gyroscopic_terms_do_no_work(vehicle, w
 
 @VEHICLES
 @MEDIA
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(rates=rates)
 def test_free_rotation_conserves_energy(vehicle, water, rates):
     free = without(vehicle, rotational_drag=(0.0, 0.0, 0.0))

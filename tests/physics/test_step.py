@@ -33,7 +33,8 @@ def test_error_falls_in_proportion_to_the_step(vehicle, height):
     rpm = base + np.array([-8.0, 5.0, 6.0, -4.0]) * (1.0 if height > 0 else 40.0)
     reference = exact(state, rpm, vehicle, 0.5)
     errors = [
-        np.linalg.norm((steps(state, rpm, vehicle, dt, round(0.5 / dt)) - reference)[:9]) for dt in 0.01 / 2 ** np.arange(5)
+        np.linalg.norm((steps(state, rpm, vehicle, dt, round(0.5 / dt)) - reference)[:9])
+        for dt in 0.01 / 2 ** np.arange(5)
     ]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert orders[-1] == pytest.approx(1.0, abs=0.15), (errors, orders)

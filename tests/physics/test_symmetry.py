@@ -41,7 +41,7 @@ def close(got, expected):
 
 
 @VEHICLES
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(state=st.one_of(states(water=False), states(water=True)), rpm=speeds, turn=st.floats(-7.0, 7.0))
 def test_no_heading_is_special(vehicle, state, rpm, turn):
     matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -57,7 +57,7 @@ def test_no_heading_is_special(vehicle, state, rpm, turn):
 
 
 @VEHICLES
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(state=states(water=True), rpm=speeds)
 def test_water_left_is_right(vehicle, state, rpm):
     """Rotors 2 and 4 swap; the yaw moment is differential thrust, so it mirrors too."""
@@ -66,7 +66,7 @@ def test_water_left_is_right(vehicle, state, rpm):
 
 
 @VEHICLES
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(state=states(water=True), rpm=speeds)
 def test_water_front_is_back(vehicle, state, rpm):
     """Rotors 1 and 3 swap and the thrusters reverse: thrust is signed (E9)."""
@@ -75,7 +75,7 @@ def test_water_front_is_back(vehicle, state, rpm):
 
 
 @VEHICLES
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(state=states(water=False), a=st.floats(0.0, 5000.0), b=st.floats(0.0, 5000.0))
 def test_air_left_is_right(vehicle, state, a, b):
     """Reaction torque has a handedness that a mirror reverses: compare where the four torques cancel."""
@@ -87,7 +87,7 @@ def test_air_left_is_right(vehicle, state, a, b):
 
 
 @VEHICLES
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(state=st.one_of(states(water=False), states(water=True)), rpm=speeds, shift=vectors(2, 100.0))
 def test_no_place_is_special(vehicle, state, rpm, shift):
     moved = state.copy()

@@ -1,0 +1,241 @@
+"""The command `hydrone`: one class a subcommand, its fields are the options and `run` returns the exit code.
+
+Exit codes: 0 success, 1 a mission that did not end at the goal, 2 bad input, told in one line.
+"""
+
+import itertools
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+import tyro
+
+from hydrone_gym._jit import CACHE_DIRECTORY
+from hydrone_gym.evaluation.flight import Flight, fly
+from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.report import draw_flight, flight_record
+from hydrone_gym.world.scenario import Scenario, load_scenario
+from planners import CLRRT, StraightLine
+from planners.policy import known
+
+EXPERIMENTS = {1: "HydroneGym/AirToWater-v0", 2: "HydroneGym/WaterToAir-v0"}
+_TREE_ITERATIONS = 400  # samples of the tree figure
+_COMPILING = "compiling kernels (once after install, about 30 s)"
+
+
+@dataclass(frozen=True)
+class Mission:
+    """One thing to fly: where, with what, and what the files and the column of the table are called."""
+
+    name: str
+    env: gym.Env
+    policy: Policy
+    scenario: Scenario
+    observation: dict[str, np.ndarray]  # the first
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fly:
+    """Fly the paper's experiments, print what happened and draw the figures."""
+
+    experiment: Literal[1, 2] | None = None
+    """1: air to water, 2: water to air; both unless given."""
+    seed: int = 0
+    """Seed of the random world and of the planner."""
+    obstacles: int | None = None
+    """Number of spheres, 20 unless given."""
+    policy: Literal["clrrt", "straight"] = "clrrt"
+    """CL-RRT, or straight lines without an eye for obstacles."""
+    iterations: int | None = None
+    """Samples the CL-RRT draws each cycle, the planner's own number unless given."""
+    time_budget: float | None = None
+    """Seconds a CL-RRT cycle may take, instead of a number of samples; not reproducible."""
+    scenario: Path | None = None
+    """Fly this scenario file instead of an experiment."""
+    vehicle: Literal["paper", "physical"] = "paper"
+    """Parameter set of the vehicle."""
+    out: Path = Path("flights")
+    """Folder for figures and flight.json; made if missing."""
+    json: bool = False
+    """Print one JSON document instead of the table."""
+    no_figures: bool = False
+    """Draw no figures."""
+
+    def run(self) -> int:
+        """Fly, report and return the exit code."""
+        try:
+            missions = self._missions()
+            self.out.mkdir(parents=True, exist_ok=True)
+        except (ValueError, OSError) as error:
+            print(f"hydrone: error: {error}", file=sys.stderr)
+            return 2
+        records = []
+        with _progress(len(missions) * (1 if self.no_figures else 3)) as step:
+            for mission in missions:
+                step(f"{mission.name}: flying")
+                mission.policy.predict(
+                    mission.observation
+                )  # loads the kernels, so that the first cycle is timed fairly
+                flight = fly(mission.env, mission.policy, seed=self.seed, scenario=mission.scenario)
+                files = [] if self.no_figures else self._draw(mission, flight, step)
+                figures = [str(file) for file in files]
+                records.append({"name": mission.name, **flight_record(flight), "figures": figures})
+        self._report(records)
+        return 0 if all(record["success"] for record in records) else 1
+
+    def _missions(self) -> list[Mission]:
+        """Check the options and set up what they ask for; raises ValueError or OSError."""
+        if self.seed < 0:
+            raise ValueError(f"--seed must not be negative, got {self.seed}")
+        if self.iterations is not None and self.time_budget is not None:
+            raise ValueError("--iterations and --time-budget exclude each other")
+        if self.policy != "clrrt" and (self.iterations is not None or self.time_budget is not None):
+            raise ValueError("--iterations and --time-budget are options of --policy clrrt")
+        if self.scenario is None:
+            _announce_compiling()
+            numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
+            count = 20 if self.obstacles is None else self.obstacles
+            return [self._mission(f"experiment-{number}", EXPERIMENTS[number], count, None) for number in numbers]
+        if self.experiment is not None or self.obstacles is not None:
+            raise ValueError("--scenario excludes --experiment and --obstacles")
+        scenario = load_scenario(self.scenario)
+        _announce_compiling()
+        return [self._mission(self.scenario.stem, "HydroneGym/Mission-v0", len(scenario.obstacles), scenario)]
+
+    def _mission(self, name: str, env_id: str, obstacles: int, scenario: Scenario | None) -> Mission:
+        """Make environment and policy; without a scenario the seed draws one."""
+        env = gym.make(env_id, num_obstacles=obstacles, vehicle=self.vehicle)
+        observation, _ = env.reset(seed=self.seed, options=None if scenario is None else {"scenario": scenario})
+        return Mission(name, env, self._policy(env), env.get_wrapper_attr("scenario"), observation)
+
+    def _policy(self, env: gym.Env) -> Policy:
+        if self.policy == "straight":
+            return StraightLine.for_env(env)
+        if self.iterations is None:
+            return CLRRT.for_env(env, time_budget=self.time_budget, seed=self.seed)
+        return CLRRT.for_env(env, iterations=self.iterations, seed=self.seed)
+
+    def _draw(self, mission: Mission, flight: Flight, step: Callable[[str], None]) -> list[Path]:
+        """Write the figures of one mission; return their paths."""
+        step(f"{mission.name}: drawing the flight")
+        files = draw_flight(flight, mission.env.get_wrapper_attr("simulation"), self.out, mission.name)
+        step(f"{mission.name}: drawing the tree")
+        return files + _draw_tree(mission, self.out)
+
+    def _report(self, records: list[dict[str, Any]]) -> None:
+        """Write flight.json, and print it or the table."""
+        options = {"policy": self.policy, "seed": self.seed, "vehicle": self.vehicle}
+        document = {"format": "hydrone_gym flights", "version": 1, **options, "flights": records}
+        text = json.dumps(document, indent=1, allow_nan=False)
+        saved = self.out / "flight.json"
+        saved.write_text(text + "\n", encoding="utf-8")
+        if self.json:
+            print(text)
+            return
+        _print_table(records)
+        for path in [*(path for record in records for path in record["figures"]), saved]:
+            print(path)
+
+
+def _announce_compiling() -> None:
+    """Say why nothing seems to happen when no kernel has been compiled yet."""
+    if CACHE_DIRECTORY is None or not any(Path(CACHE_DIRECTORY).rglob("*.nbi")):
+        print(_COMPILING, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _progress(steps: int) -> Iterator[Callable[[str], None]]:
+    """Show a progress line on stderr; yields a function that names the next step."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task, begun = bar.add_task("", total=steps), itertools.count()
+
+        def step(description: str) -> None:
+            bar.update(task, description=description, completed=next(begun), refresh=True)
+
+        yield step
+
+
+def _draw_tree(mission: Mission, folder: Path) -> list[Path]:
+    """Draw the tree that the CL-RRT grows from the start when every obstacle is known (paper, Fig. 5)."""
+    if not isinstance(mission.policy, CLRRT):
+        return []
+    from hydrone_gym.rendering.figures import plot_tree, save_figure
+
+    now = known(mission.observation)._replace(obstacles=mission.scenario.obstacles.copy())
+    tree = mission.policy.grow_tree(now, _TREE_ITERATIONS)
+    path = tree.edges[tree.path]
+    solution = np.concatenate((path[:1, 0], path[:, 1])) if len(path) else None
+    world = mission.env.get_wrapper_attr("world")
+    title = f"{mission.name.replace('-', ' ').capitalize()}: tree of {len(tree.edges)} edges, every obstacle known"
+    figure = plot_tree(
+        tree.edges,
+        tree.air,
+        mission.scenario.start[:3],
+        mission.scenario.goal,
+        now.obstacles,
+        solution=solution,
+        lower=world.lower,
+        upper=world.upper,
+        title=title,
+    )
+    return save_figure(figure, folder / f"{mission.name}-tree")
+
+
+def _print_table(records: list[dict[str, Any]]) -> None:
+    """Print one column a flight on stdout."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(header_style="bold")
+    table.add_column("")
+    for record in records:
+        table.add_column(record["name"], justify="right")
+    columns = [_cells(record) for record in records]
+    for label in columns[0]:
+        table.add_row(label, *(column[label] for column in columns))
+    Console().print(table)
+
+
+def _cells(record: dict[str, Any]) -> dict[str, str]:
+    """Format what the table shows of one flight, label to text."""
+    crossings = record["transitions"]
+
+    def each(key: str, scale: float, digits: int) -> str:
+        return ", ".join(f"{scale * crossing[key]:.{digits}f}" for crossing in crossings) or "-"
+
+    clearance = record["clearance"]
+    return {
+        "outcome": record["outcome"],
+        "time (s)": f"{record['time']:.2f}",
+        "crossing at (s)": each("time", 1.0, 2),
+        "lateral speed at crossing (m/s)": each("lateral_speed", 1.0, 3),
+        "tilt at crossing (°)": each("tilt", 180.0 / math.pi, 2),
+        "least clearance (m)": "-" if clearance is None else f"{clearance:.2f}",
+        "length (m)": f"{record['length']:.1f}",
+        "energy (J)": f"{record['energy']:.0f}",
+        "planning p50 (ms)": f"{record['planning_ms']['p50']:.2f}",
+        "planning p99 (ms)": f"{record['planning_ms']['p99']:.2f}",
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; `arguments` default to those of the process."""
+    command = tyro.extras.subcommand_cli_from_dict(
+        {"fly": Fly},
+        prog="hydrone",
+        description="Fly the HyDrone in air, through the water surface and below it.",
+        args=arguments,
+        config=(tyro.conf.FlagCreatePairsOff,),
+    )
+    return command.run()

@@ -1,0 +1,66 @@
+"""What callers hand to an environment at reset and step: checked, and brought to the one form the kernels read."""
+
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from hydrone_gym.world.scenario import Scenario, load_scenario, validate
+from hydrone_gym.world.world import World
+
+_REFERENCE = "[x, y, z, psi] (m, m, m, rad)"
+
+
+def requested_scenario(options: dict[str, Any] | None) -> Scenario | None:
+    """Return the scenario that the options of a reset ask for, loaded if they name a file; None to draw one.
+
+    Raises ValueError for an unknown option or for anything that is no scenario.
+    """
+    unknown = sorted(map(repr, set(options or {}) - {"scenario"}))
+    if unknown:
+        raise ValueError(f"unknown reset option {', '.join(unknown)}; known are 'scenario'")
+    chosen = (options or {}).get("scenario")
+    if isinstance(chosen, str | os.PathLike):
+        return load_scenario(Path(chosen))
+    if chosen is not None and not isinstance(chosen, Scenario):
+        raise ValueError(f"scenario must be a Scenario or the path of its file, got {type(chosen).__name__}")
+    return chosen
+
+
+def check_scenario(scenario: Scenario, world: World, vehicle_radius: float, bounds: spaces.Box) -> None:
+    """Raise ValueError unless a vehicle of this radius (m) can fly a scenario and the observation can show it.
+
+    `bounds` is the space of the observed obstacles, (num_obstacles, 4).
+    """
+    validate(scenario, world, vehicle_radius)
+    count, most = len(scenario.obstacles), bounds.shape[0]
+    if count > most:
+        raise ValueError(f"scenario must have at most num_obstacles={most} obstacles, got {count}")
+    for index, sphere in enumerate(scenario.obstacles):
+        if (sphere < bounds.low[index]).any() or (sphere > bounds.high[index]).any():
+            low, high = bounds.low[index].tolist(), bounds.high[index].tolist()
+            raise ValueError(f"obstacle {index} must lie between {low} and {high} (m), got {sphere.tolist()}")
+
+
+def load_reference(
+    action: ArrayLike, low: NDArray[np.float64], high: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """Check an action and clip it to [low, high] into `out`; all (4,).
+
+    Raises ValueError unless it is four finite numbers.
+    """
+    try:
+        reference = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"action must be four numbers {_REFERENCE}, got {action!r}") from None
+    if reference.shape != (4,):
+        raise ValueError(f"action must have shape (4,) {_REFERENCE}, got {reference.shape}")
+    # on four numbers math is several times faster than NumPy
+    if not all(map(math.isfinite, reference.tolist())):
+        raise ValueError(f"action must be finite {_REFERENCE}, got {reference}")
+    np.maximum(reference, low, out=out)
+    np.minimum(out, high, out=out)
