@@ -80,9 +80,7 @@ class Fly:
         with _progress(len(missions) * (1 if self.no_figures else 3)) as step:
             for mission in missions:
                 step(f"{mission.name}: flying")
-                mission.policy.predict(
-                    mission.observation
-                )  # loads the kernels, so that the first cycle is timed fairly
+                mission.policy.predict(mission.observation)  # loads the kernels: no cycle's time shall hold that
                 flight = fly(mission.env, mission.policy, seed=self.seed, scenario=mission.scenario)
                 files = [] if self.no_figures else self._draw(mission, flight, step)
                 figures = [str(file) for file in files]

@@ -1,4 +1,4 @@
-"""The attitude that the control laws ask for along a flight; a policy sends positions, so this is found nowhere else."""
+"""The attitude that the control laws ask for along a flight, which a policy that sends positions never sees."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from hydrone_gym.simulation.simulation import TICK, Simulation
 
 
 @kernel
-def _write_references(states, moving, values, tick, out):
+def _write_references(
+    states: NDArray, moving: NDArray, values: NDArray[np.float64], tick: float, out: NDArray[np.float64]
+) -> None:
     """Write the attitude reference (φ, θ, ψ) of every sample; NaN where a law has none.
 
     Shapes: states (N, 12), moving (N, 4), values packed `Model`, out (N, 3); tick in s.

@@ -33,7 +33,8 @@ class Flight:
         time: s.
         energy: of the rotors' shafts, J.
         clearance: least distance of the vehicle's sphere to an obstacle, m; infinite without obstacles.
-        transitions: a dict for each crossing: time (s), direction, lateral_speed (m/s), tilt (rad), vertical_speed (m/s).
+        transitions: a dict for each crossing: time (s), direction, lateral_speed (m/s), tilt (rad),
+            vertical_speed (m/s).
         length: of the path, summed over ticks, m.
         episode_return: sum of rewards.
         references: (K, 4) those in force at the end of each period, the action after clipping: m, m, m, rad.

@@ -6,9 +6,10 @@ imported when the first figure is drawn, and no display is needed.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,12 +97,12 @@ def plot_tree(
     scene = Scene(lower, upper, azimuth=camera_azimuth(start, goal))
     scene.spheres(obstacles, style.DETECTED)
     if solution is not None:  # beneath the branches, which keep their colour
-        scene.lines([np.asarray(solution)], style.BLACK, 4.5)
+        scene.lines([np.asarray(solution)], style.BLACK, 4.5, lower=2)
     scene.lines(list(edges[in_air]), style.RED, 1.3)
     scene.lines(list(edges[~in_air]), style.PURPLE, 1.6)
     scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
     scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    entries: list[tuple[str, dict[str, object]]] = [
+    entries: list[tuple[str, dict[str, Any]]] = [
         ("branch in air", {"color": style.RED, "linewidth": 2.0}),
         ("branch under water", {"color": style.PURPLE, "linewidth": 2.0}),
         ("obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}),
@@ -117,8 +118,11 @@ def save_figure(figure: Figure, path: str | Path) -> list[Path]:
     written = [Path(f"{path}.{suffix}") for suffix in FORMATS]
     for target in written:
         # no date inside, so equal flights give equal files
-        extra = {"metadata": {"CreationDate": None}} if target.suffix == ".pdf" else {}
-        figure.savefig(target, dpi=style.DOTS_PER_INCH, **extra)
+        figure.savefig(
+            target,
+            dpi=style.DOTS_PER_INCH,
+            metadata={"CreationDate": None} if target.suffix == ".pdf" else None,
+        )
     return written
 
 
@@ -128,7 +132,7 @@ def split_media(positions: NDArray[np.float64]) -> tuple[list[NDArray[np.float64
     wet = line[:-1, 2] + line[1:, 2] < 0.0
     cuts = [0, *(np.flatnonzero(wet[1:] != wet[:-1]) + 1).tolist(), len(line) - 1]
     parts: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
-    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+    for first, last in itertools.pairwise(cuts):
         if last > first:
             parts[int(wet[first])].append(line[first : last + 1])
     return parts
@@ -157,7 +161,7 @@ def _dashes(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return dashes
 
 
-def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, object]]]) -> None:
+def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, Any]]]) -> None:
     """Put a title and a legend below the scene: the entries, then every mark that has a label."""
     from matplotlib import rc_context
     from matplotlib.lines import Line2D
@@ -174,8 +178,8 @@ def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, object]
 _BALL = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
 
 
-def _path_entries(unknown: bool, air: bool, water: bool) -> list[tuple[str, dict[str, object]]]:
-    entries: list[tuple[str, dict[str, object]]] = []
+def _path_entries(unknown: bool, air: bool, water: bool) -> list[tuple[str, dict[str, Any]]]:
+    entries: list[tuple[str, dict[str, Any]]] = []
     if air:
         entries.append(("path in air", {"color": style.RED, "linewidth": 2.8}))
     if water:

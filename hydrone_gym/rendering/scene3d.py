@@ -6,7 +6,8 @@ lies under water, then the surface, then what lies above it; within each half fa
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import itertools
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,15 +50,15 @@ class Scene:
         self._reach = float(np.linalg.norm(self._upper - self._lower))
         with rc_context(style.FONTS):
             self.figure: Figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH)
-            self.axes = self.figure.add_axes((0.01, 0.09, 0.97, 0.89), projection="3d", computed_zorder=False)
-        self.axes.set_proj_type("ortho")
-        self.axes.view_init(elev=elevation, azim=azimuth)
-        self._frame()
+            self.axes: Any = self.figure.add_axes((0.01, 0.09, 0.97, 0.89), projection="3d", computed_zorder=False)
+        self._frame(elevation, azimuth)
         self._surface()
 
-    def _frame(self) -> None:
-        """Limits, equal scale on all axes, labels and a quiet background."""
+    def _frame(self, elevation: float, azimuth: float) -> None:
+        """Camera, limits, equal scale on all axes, labels and a quiet background."""
         ax = self.axes
+        ax.set_proj_type("ortho")
+        ax.view_init(elev=elevation, azim=azimuth)
         ax.set(xlim=(self._lower[0], self._upper[0]), ylim=(self._lower[1], self._upper[1]))
         ax.set_zlim(self._lower[2], self._upper[2])
         ax.set_box_aspect(self._upper - self._lower, zoom=1.16)
@@ -116,9 +117,13 @@ class Scene:
         self._add(ball)
 
     def lines(
-        self, polylines: list[NDArray[np.float64]], colour: str, width: float, alpha: float = 1.0, hidden: float = 0.0
+        self, polylines: list[NDArray[np.float64]], colour: str, width: float, hidden: float = 0.0, lower: int = 0
     ) -> None:
-        """Add polylines, each (n, 3) in m; `hidden` is the opacity with which parts behind spheres shine through."""
+        """Add polylines, each (n, 3) in m.
+
+        `hidden` is the opacity with which parts behind spheres shine through. `lower` puts a wide line beneath the thin
+        ones along it, by so many slices of depth.
+        """
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
         pieces = [piece for line in polylines for piece in _pieces(np.asarray(line, dtype=np.float64))]
@@ -130,9 +135,9 @@ class Scene:
         slices = np.floor(order / (900.0 / _BINS)).astype(int)
         for number in np.unique(slices):
             chosen = np.flatnonzero(slices == number)
-            part = Line3DCollection([pieces[i] for i in chosen], colors=[_rgba(colour, alpha)], linewidths=width)
+            part = Line3DCollection([pieces[i] for i in chosen], colors=[colour], linewidths=width)
             part.set_capstyle("round")
-            part.set_zorder(number * (900.0 / _BINS))
+            part.set_zorder((number - lower) * (900.0 / _BINS))
             self._add(part)
         if hidden > 0.0:
             ghost = Line3DCollection(polylines, colors=[_rgba(colour, hidden)], linewidths=0.6 * width)
@@ -170,7 +175,7 @@ class Scene:
         )
 
 
-def _every_five() -> object:
+def _every_five() -> Any:
     from matplotlib.ticker import MultipleLocator
 
     return MultipleLocator(5.0)
@@ -193,7 +198,7 @@ def _pieces(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     wet = line[:-1, 2] + line[1:, 2] < 0.0
     change = (np.diff(sections[:-1]) != 0) | (np.diff(wet.astype(int)) != 0)
     cuts = [0, *(np.flatnonzero(change) + 1).tolist(), len(line) - 1]
-    return [line[first : last + 1] for first, last in zip(cuts[:-1], cuts[1:], strict=True) if last > first]
+    return [line[first : last + 1] for first, last in itertools.pairwise(cuts) if last > first]
 
 
 def split_at_surface(line: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,9 +7,8 @@ so its picture is the convex hull of its projected rim. Eight polygons a sphere 
 import numpy as np
 from numpy.typing import NDArray
 
-_CAPS = np.radians(
-    [52.0, 46.0, 40.0, 34.0, 28.0, 22.0, 15.0]
-)  # half-angles of the lit caps, all in full view of the camera
+# half-angles of the lit caps, all in full view of the camera
+_CAPS = np.radians([52.0, 46.0, 40.0, 34.0, 28.0, 22.0, 15.0])
 _LIGHT = np.array([-0.35, 0.45, 0.82])  # in camera axes: right, up, towards the eye
 _RIM = 64  # points round an outline
 

@@ -12,7 +12,7 @@ from planners.cl_rrt.execute import cycle
 from planners.cl_rrt.expand import DRAWS
 from planners.cl_rrt.settings import CLRRTSettings
 from planners.cl_rrt.tree import BACKUP, new_nodes, new_workspace
-from planners.policy import Known, PlannerPolicy, simulation_of
+from planners.policy import Known, Observation, PlannerPolicy, known, simulation_of
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
@@ -106,8 +106,8 @@ class CLRRT(PlannerPolicy):
         if first < 0:
             return self._safety_action(memory)
         reference = work.nodes["reference"][first].copy()
-        known = len(now.obstacles)
-        return reference, Memory(work.nodes, size, first, known, work.backup, stop, memory.cycle + 1)
+        count = len(now.obstacles)
+        return reference, Memory(work.nodes, size, first, count, work.backup, stop, memory.cycle + 1)
 
     def _run(self, work: Any, now: Known, memory: Memory) -> tuple[int, int, int]:
         """Grow and choose within the budget."""
@@ -152,10 +152,15 @@ class CLRRT(PlannerPolicy):
             backup, stop = np.roll(backup, -1, axis=0), stop - 1
         return reference, Memory(memory.nodes, 0, -1, 0, backup, stop, memory.cycle + 1, memory.waiting + 1)
 
-    def grow_tree(self, now: Known, iterations: int) -> TreeView:
-        """Grow a tree from an observation without flying, as in the paper's Fig. 5."""
-        memory = Memory(new_nodes(self.settings.max_nodes), 0, -1, 0, np.tile(now.reference, (BACKUP, 1)), 1, 0)
-        work = new_workspace(memory.nodes.copy(), now.obstacles, memory.backup.copy())
+    def grow_tree(self, observation: Observation, iterations: int) -> TreeView:
+        """Grow a tree from one observation without flying, as in the paper's Fig. 5.
+
+        Args:
+            observation: Dict observation; put every sphere of the scenario into `obstacles` to plan with a known map.
+            iterations: samples.
+        """
+        now = known(observation)
+        work = new_workspace(new_nodes(self.settings.max_nodes), now.obstacles, np.zeros((BACKUP, 4)))
         observed = np.concatenate([now.state, now.integral, now.reference])
         draws = np.random.default_rng(self.seed).random(iterations * DRAWS)
         values, ticks = self.simulation.values, self.simulation.ticks
@@ -166,9 +171,8 @@ class CLRRT(PlannerPolicy):
         edges = np.stack([nodes["reference"][nodes["parent"][1:], :3], nodes["reference"][1:, :3]], axis=1)
         ends = np.flatnonzero(nodes["goal"])
         path: list[int] = []
-        if len(ends):
-            i = int(ends[np.argmin(nodes["time"][ends])])
-            while i > 0:
-                path.append(i - 1)
-                i = int(nodes["parent"][i])
+        i = int(ends[np.argmin(nodes["time"][ends])]) if len(ends) else 0
+        while i > 0:
+            path.append(i - 1)
+            i = int(nodes["parent"][i])
         return TreeView(edges, nodes["state"][1:, 2] > 0.0, nodes["time"][1:], np.array(path[::-1], np.intp))

@@ -1,7 +1,7 @@
 """The model of the paper, as corrected, in matrix form: slow, obvious, and sharing no line with the kernels.
 
-Everything is a vector or a matrix and every equation is one statement, so it can be read beside the paper. The functions
-also compile with plain ``numba.njit``, which `tests/simulation` uses to hand them to SciPy's integrators.
+Everything is a vector or a matrix and every equation is one statement, so it can be read beside the paper. The
+functions also compile with plain ``numba.njit``, which `tests/simulation` uses to hand them to SciPy's integrators.
 """
 
 from typing import NamedTuple
