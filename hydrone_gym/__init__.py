@@ -34,5 +34,6 @@ for _id, _mission in (("AirToWater", "air_to_water"), ("WaterToAir", "water_to_a
     register(
         id=f"HydroneGym/{_id}-v0",
         entry_point="hydrone_gym.envs.hydrone_env:HydroneEnv",
+        vector_entry_point="hydrone_gym.envs.vector_env:HydroneVectorEnv",
         kwargs={"mission": _mission},
     )

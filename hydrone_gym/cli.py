@@ -23,7 +23,6 @@ from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
 from hydrone_gym.world.scenario import Scenario, load_scenario
 from planners import CLRRT, StraightLine
-from planners.policy import known
 
 EXPERIMENTS = {1: "HydroneGym/AirToWater-v0", 2: "HydroneGym/WaterToAir-v0"}
 _TREE_ITERATIONS = 400  # samples of the tree figure
@@ -170,8 +169,8 @@ def _draw_tree(mission: Mission, folder: Path) -> list[Path]:
         return []
     from hydrone_gym.rendering.figures import plot_tree, save_figure
 
-    now = known(mission.observation)._replace(obstacles=mission.scenario.obstacles.copy())
-    tree = mission.policy.grow_tree(now, _TREE_ITERATIONS)
+    everything = {**mission.observation, "obstacles": mission.scenario.obstacles}
+    tree = mission.policy.grow_tree(everything, _TREE_ITERATIONS)
     path = tree.edges[tree.path]
     solution = np.concatenate((path[:1, 0], path[:, 1])) if len(path) else None
     world = mission.env.get_wrapper_attr("world")
@@ -181,7 +180,7 @@ def _draw_tree(mission: Mission, folder: Path) -> list[Path]:
         tree.air,
         mission.scenario.start[:3],
         mission.scenario.goal,
-        now.obstacles,
+        mission.scenario.obstacles,
         solution=solution,
         lower=world.lower,
         upper=world.upper,

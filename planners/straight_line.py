@@ -78,8 +78,6 @@ class StraightLine(PlannerPolicy):
         heading = now.state[5]  # the law of sight steers; the vehicle must not turn when it comes out
         if goal[2] > 0.0:
             return np.array([position[0], position[1], self._gate, heading])
-        if position[2] >= -self._zone and goal[2] < -self._zone:
-            return np.array([goal[0], goal[1], max(goal[2], -self._gate), heading])
         offset = goal - position
         share = max(float(np.linalg.norm(offset)) / SWIM_LEAD, 1.0)
         return np.append(position + offset / share, heading)

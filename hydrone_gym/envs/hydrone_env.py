@@ -16,15 +16,16 @@ from hydrone_gym.envs.requests import check_scenario, load_reference, requested_
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.snapshot import Snapshot
 from hydrone_gym.envs.spaces import action_space, observation_space
-from hydrone_gym.envs.task import REPORT, copy_episodes, new_episodes, pack_task, settle
+from hydrone_gym.envs.task import REPORT, begin_rows, copy_episodes, new_episodes, pack_task, settle
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import Simulation, row_at
+from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle, named_vehicle
 from hydrone_gym.world.generator import generate
 from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
 
 Observation = dict[str, NDArray[np.float64]]
+_ONLY = np.zeros(1, np.int64)  # the one row
 
 
 class HydroneEnv(gym.Env[Any, Any]):
@@ -208,21 +209,12 @@ class HydroneEnv(gym.Env[Any, Any]):
 
     def _begin(self, scenario: Scenario) -> None:
         """Put the vehicle at the start of a scenario, with nothing known but what is in range there."""
-        state = np.zeros(12)
-        state[:3] = scenario.start[:3]
-        state[5] = math.remainder(scenario.start[3], 2.0 * math.pi)
-        now = self._episodes
-        now.rows[:] = row_at(state, np.array(scenario.goal))
-        now.obstacles[:] = 0.0
-        now.obstacles[0, : scenario.obstacles.size] = scenario.obstacles.ravel()
-        now.closest[:] = np.inf
-        now.seen[:] = 0
+        x, y, z, yaw = scenario.start
+        starts = np.array([[x, y, z, math.remainder(yaw, 2.0 * math.pi)]])
+        goals, spheres = np.array([scenario.goal]), scenario.obstacles[None]
+        begin_rows(*self._episodes, spheres.shape[1], 1, self._task, _ONLY, starts, goals, spheres, self._report)
         self._scenario = scenario
         self._transitions = []
-        self._settle(True)
-
-    def _settle(self, starting: bool) -> None:
-        settle(*self._episodes, len(self.scenario.obstacles), 1, self._task, 0, 1, starting, self._report)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period with the reference moving to the action.
@@ -246,7 +238,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         load_reference(action, self._lowest, self._highest, self._reference[0])
         count = len(self._scenario.obstacles)
         self._simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
-        self._settle(False)
+        settle(*now, count, 1, self._task, _ONLY, self._report)
         report = self._report[0].tolist()
         if report[-1] > 0.0:
             self._transitions += crossings_of(now.rows["crossing_log"][0], int(report[-1]))

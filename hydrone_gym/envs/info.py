@@ -34,3 +34,36 @@ def crossings_of(log: np.ndarray, count: int) -> list[dict[str, Any]]:
         crossing["direction"] = "exit" if crossing["direction"] > 0.0 else "entry"
         crossings.append(crossing)
     return crossings
+
+
+def batch_info(report: np.ndarray, transitions: np.ndarray) -> dict[str, Any]:
+    """Return `info` for many rows, arrays with their masks as Gymnasium's vector environments give them.
+
+    Args:
+        report: (n, len(REPORT)).
+        transitions: (n,) object, a list of crossings a row.
+    """
+    n = len(report)
+    terms: dict[str, Any] = {}
+    for k, name in enumerate(TERMS):
+        terms[name], terms[f"_{name}"] = report[:, k].copy(), np.ones(n, bool)
+    info = {
+        "outcome": report[:, _OUTCOME].astype(np.int64),
+        "time": report[:, _OUTCOME + 1].copy(),
+        "energy": report[:, _OUTCOME + 2].copy(),
+        "clearance": report[:, _OUTCOME + 3].copy(),
+        "transitions": transitions.copy(),
+        "reward_terms": terms,
+    }
+    return info | {f"_{key}": np.ones(n, bool) for key in info}
+
+
+def masked(info: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:
+    """Return a batch's info with only the rows of a mask (n,) filled in, the others zero (None for objects)."""
+    kept: dict[str, Any] = {}
+    for key, value in info.items():
+        if isinstance(value, dict):
+            kept[key] = masked(value, mask)
+        else:
+            kept[key] = np.where(mask, value, None if value.dtype == object else np.zeros((), value.dtype))
+    return kept

@@ -20,10 +20,41 @@ def requested_scenario(options: dict[str, Any] | None) -> Scenario | None:
 
     Raises ValueError for an unknown option or for anything that is no scenario.
     """
-    unknown = sorted(map(repr, set(options or {}) - {"scenario"}))
+    _check_known(options, ("scenario",))
+    return _scenario((options or {}).get("scenario"))
+
+
+def requested_rows(options: dict[str, Any] | None, count: int) -> tuple[NDArray[np.intp], list[Scenario | None]]:
+    """Return which of `count` rows a reset is for, and what each of them is to fly (None: draw one).
+
+    Raises TypeError or ValueError for an unknown option, a mask that is not (count,) bool with a True in it, or the
+    wrong number of scenarios.
+    """
+    _check_known(options, ("scenario", "reset_mask"))
+    given = options or {}
+    mask = given.get("reset_mask")
+    if mask is not None:
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+            raise TypeError(f"reset_mask must be an array of bool, got {mask!r}")
+        if mask.shape != (count,) or not mask.any():
+            raise ValueError(f"reset_mask must have shape ({count},) and a True in it, got {mask!r}")
+    rows = np.arange(count) if mask is None else np.flatnonzero(mask)
+    chosen = given.get("scenario")
+    if not isinstance(chosen, list | tuple):
+        return rows, [_scenario(chosen)] * len(rows)
+    if len(chosen) != count:
+        raise ValueError(f"scenario must be one scenario or a sequence of {count}, got {len(chosen)}")
+    return rows, [_scenario(chosen[row]) for row in rows]
+
+
+def _check_known(options: dict[str, Any] | None, known: tuple[str, ...]) -> None:
+    unknown = sorted(map(repr, set(options or {}) - set(known)))
     if unknown:
-        raise ValueError(f"unknown reset option {', '.join(unknown)}; known are 'scenario'")
-    chosen = (options or {}).get("scenario")
+        raise ValueError(f"unknown reset option {', '.join(unknown)}; known are {', '.join(map(repr, known))}")
+
+
+def _scenario(chosen: Any) -> Scenario | None:
+    """Return a scenario, loaded if a file is named; None stays None."""
     if isinstance(chosen, str | os.PathLike):
         return load_scenario(Path(chosen))
     if chosen is not None and not isinstance(chosen, Scenario):
@@ -64,3 +95,20 @@ def load_reference(
         raise ValueError(f"action must be finite {_REFERENCE}, got {reference}")
     np.maximum(reference, low, out=out)
     np.minimum(out, high, out=out)
+
+
+def load_references(
+    actions: ArrayLike, low: NDArray[np.float64], high: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Check the actions of `count` rows and return them (count, 4), clipped to [low, high].
+
+    Raises ValueError for another shape, or naming the rows that are not finite.
+    """
+    references = np.asarray(actions, dtype=np.float64)
+    if references.shape != (count, 4):
+        raise ValueError(f"actions must have shape ({count}, 4) {_REFERENCE}, got {references.shape}")
+    finite = np.isfinite(references)
+    if not finite.all():
+        bad = np.flatnonzero(~finite.all(axis=1)).tolist()
+        raise ValueError(f"actions must be finite {_REFERENCE}; rows {bad} are not")
+    return np.clip(references, low, high)

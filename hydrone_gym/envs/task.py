@@ -109,6 +109,21 @@ def _begin(n, rows, obstacles, closest, potential, seen, found, known, lane, lan
 
 
 @inlined
+def _place_row(row, starts, goals, k):
+    """Put a row at rest and level at start k, its reference where it is, memory and counters empty."""
+    for c in range(12):
+        row.state[c] = 0.0
+    for c in range(4):
+        row.integral[c] = 0.0
+        row.reference[c] = starts[k, c]
+    for c in range(3):
+        row.state[c] = starts[k, c]
+        row.goal[c] = goals[k, c]
+    row.state[5] = starts[k, 3]
+    row.ticks, row.energy, row.outcome, row.crossings = 0.0, 0.0, RUNNING, 0.0
+
+
+@inlined
 def _judge(n, rows, potential, params, report):
     """Judge row n after a period: time-out, reward, and what is reported."""
     row = rows[n]
@@ -127,29 +142,67 @@ def _judge(n, rows, potential, params, report):
 
 
 @kernel
-def settle(
-    rows, obstacles, closest, potential, seen, found, known, count, lanes, values, first, last, starting, report
-):
-    """Settle rows [first, last) before their first period or after each: distances, reward, sensing, report.
+def settle(rows, obstacles, closest, potential, seen, found, known, count, lanes, values, order, report):
+    """Settle rows after a period: reward, sensing, report.
 
     Args:
         rows, obstacles, closest, potential, seen, found, known: fields of `Episodes`, updated.
         count: number of obstacles.
         lanes: rows a block.
         values: from `pack_task`.
-        first, last: which rows.
-        starting: True before the first period: the rows' states and goals and the obstacles are all that is read.
+        order: (k,) which rows.
         report: (n, len(REPORT)) float64, written; the crossings counted are those of this period.
     """
     params = _unpack_task(values)
-    for n in range(first, last):
+    for k in range(order.size):
+        n = order[k]
         block, lane = n // lanes, n % lanes
-        near = closest[block]
-        spheres = obstacles[block]
-        if starting:
-            _begin(n, rows, spheres, near, potential, seen, found, known, lane, lanes, count, params)
         _judge(n, rows, potential, params, report)
-        if starting:
-            for term in range(_OUTCOME):  # nothing has been earned yet
-                report[n, term] = 0.0
-        detect(spheres, near, lane, lanes, count, params.sensor_range, n, seen, found, known)
+        detect(obstacles[block], closest[block], lane, lanes, count, params.sensor_range, n, seen, found, known)
+
+
+@kernel
+def begin_rows(
+    rows,
+    obstacles,
+    closest,
+    potential,
+    seen,
+    found,
+    known,
+    count,
+    lanes,
+    values,
+    order,
+    starts,
+    goals,
+    spheres,
+    report,
+):
+    """Begin episodes: at rest at their starts, with nothing known but what is in range there.
+
+    Args:
+        rows, obstacles, closest, potential, seen, found, known: fields of `Episodes`, written.
+        count: number of obstacles.
+        lanes: rows a block.
+        values: from `pack_task`.
+        order: (k,) which rows.
+        starts: (k, 4) x, y, z in m and yaw in rad, in [-pi, pi].
+        goals: (k, 3) m.
+        spheres: (k, count, 4) x, y, z, r in m.
+        report: (n, len(REPORT)) float64, written; no reward has been earned yet.
+    """
+    params = _unpack_task(values)
+    for k in range(order.size):
+        n = order[k]
+        block, lane = n // lanes, n % lanes
+        _place_row(rows[n], starts, goals, k)
+        for j in range(count):
+            for c in range(4):
+                obstacles[block, (4 * j + c) * lanes + lane] = spheres[k, j, c]
+        near, centres = closest[block], obstacles[block]
+        _begin(n, rows, centres, near, potential, seen, found, known, lane, lanes, count, params)
+        _judge(n, rows, potential, params, report)
+        for term in range(_OUTCOME):
+            report[n, term] = 0.0
+        detect(centres, near, lane, lanes, count, params.sensor_range, n, seen, found, known)

@@ -194,8 +194,8 @@ def _place_ends(law, numbers, start, goal):
     return 0
 
 
-@kernel
-def _place(record, space, numbers, start, goal, obstacles):
+@inlined
+def _place_one(record, space, numbers, start, goal, obstacles):
     """Draw ends and spheres from uniform numbers in [0, 1) and try the simple routes.
 
     Shapes: record and space (1,) from `prepare`, numbers (K,); start (4,), goal (3,) and obstacles (M, 4) are written.
@@ -224,6 +224,31 @@ def _place(record, space, numbers, start, goal, obstacles):
     return _SIMPLE_ROUTE if has_simple_route(space, start, goal, obstacles) else _NO_SIMPLE_ROUTE
 
 
+@kernel
+def _place(record, space, numbers, start, goal, obstacles):
+    """`_place_one` for Python."""
+    return _place_one(record, space, numbers, start, goal, obstacles)
+
+
+@kernel
+def place_many(record, space, numbers, chosen, starts, goals, obstacles):
+    """Place many scenarios at once: line i of `numbers` (k, K) for entry chosen[i] of the three outputs.
+
+    Returns (k,) bool, whether each has a simple route; the others go on with `draw` and the same numbers.
+    """
+    solved = np.zeros(chosen.size, np.bool_)
+    for i in range(chosen.size):
+        k = chosen[i]
+        status = _place_one(record, space, numbers[i], starts[k], goals[k], obstacles[k])
+        solved[i] = status == _SIMPLE_ROUTE
+    return solved
+
+
+def first_numbers(law: ScenarioLaw) -> int:
+    """How many uniform numbers `draw` takes from a generator at a time."""
+    return 30 + 5 * law.num_obstacles
+
+
 def draw(
     law: ScenarioLaw,
     prepared: tuple[np.ndarray, np.ndarray],
@@ -231,16 +256,18 @@ def draw(
     start: np.ndarray,
     goal: np.ndarray,
     obstacles: np.ndarray,
+    first: np.ndarray | None = None,
 ) -> None:
     """Draw a solvable scenario into arrays: start (4,), goal (3,), obstacles (num_obstacles, 4), float64, contiguous.
 
-    `prepared` comes from `prepare` for the same law. Raises ValueError when the law leaves no room for ends or spheres,
+    `prepared` comes from `prepare` for the same law; `first` holds the `first_numbers` of the generator if they were
+    taken from it already. Raises ValueError when the law leaves no room for ends or spheres,
     or when none of `ATTEMPTS` scenarios was solvable.
     """
     record, space = prepared
-    usual = 30 + 5 * law.num_obstacles
-    for _ in range(ATTEMPTS):
-        numbers = rng.random(usual)
+    usual = first_numbers(law)
+    for attempt in range(ATTEMPTS):
+        numbers = first if first is not None and attempt == 0 else rng.random(usual)
         status = _place(record, space, numbers, start, goal, obstacles)
         while status <= _NO_SPHERES:
             if numbers.size >= MOST_NUMBERS * usual:

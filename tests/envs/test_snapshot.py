@@ -50,7 +50,9 @@ def test_restore_goes_on_alike_again_and_again():
     expected = wander(env, STEPS, 9)
     assert len(expected) > STEPS, "the flight should end at least once, so that new scenarios are drawn"
     for _ in range(2):
+        env.reset()
         env.set_state(snapshot)
+        assert env.scenario is snapshot.scenario
         assert same(wander(env, STEPS, 9), expected)
 
 
@@ -76,6 +78,8 @@ def test_snapshot_keeps_crossings_detection_and_the_end():
     assert info["transitions"] == infos[-1]["transitions"]
     info["transitions"][0]["time"] = -1.0
     assert snapshot.transitions[0]["time"] > 0.0
+    *_, later = env.step(np.array([-5.0, 0.0, -3.0, 0.0]))
+    assert later["transitions"] == infos[-1]["transitions"]
 
 
 def test_snapshots_of_other_environments_are_refused():
