@@ -12,6 +12,9 @@ from hydrone_gym.simulation.outcome import Outcome
 
 _OUTCOMES = tuple(Outcome)
 _OUTCOME = REPORT.index("outcome")
+_BATCH = ("outcome", "time", "energy", "clearance", "transitions", "reward_terms")
+_BATCH_MASKS = tuple(f"_{name}" for name in _BATCH)
+_TERM_MASKS = tuple(f"_{name}" for name in TERMS)
 
 
 def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -43,19 +46,13 @@ def batch_info(report: np.ndarray, transitions: np.ndarray) -> dict[str, Any]:
         report: (n, len(REPORT)).
         transitions: (n,) object, a list of crossings a row.
     """
-    n = len(report)
-    terms: dict[str, Any] = {}
-    for k, name in enumerate(TERMS):
-        terms[name], terms[f"_{name}"] = report[:, k].copy(), np.ones(n, bool)
-    info = {
-        "outcome": report[:, _OUTCOME].astype(np.int64),
-        "time": report[:, _OUTCOME + 1].copy(),
-        "energy": report[:, _OUTCOME + 2].copy(),
-        "clearance": report[:, _OUTCOME + 3].copy(),
-        "transitions": transitions.copy(),
-        "reward_terms": terms,
-    }
-    return info | {f"_{key}": np.ones(n, bool) for key in info}
+    columns = report.T.copy()
+    all_rows = np.ones((len(_BATCH) + len(TERMS), len(report)), bool)
+    terms: dict[str, Any] = dict(zip(TERMS, columns))
+    terms |= zip(_TERM_MASKS, all_rows)
+    values = (columns[_OUTCOME].astype(np.int64), *columns[_OUTCOME + 1 : _OUTCOME + 4], transitions.copy(), terms)
+    info: dict[str, Any] = dict(zip(_BATCH, values, strict=True))
+    return info | dict(zip(_BATCH_MASKS, all_rows[len(TERMS) :], strict=True))
 
 
 def masked(info: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:

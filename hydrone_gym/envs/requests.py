@@ -111,4 +111,4 @@ def load_references(
     if not finite.all():
         bad = np.flatnonzero(~finite.all(axis=1)).tolist()
         raise ValueError(f"actions must be finite {_REFERENCE}; rows {bad} are not")
-    return np.clip(references, low, high)
+    return np.minimum(np.maximum(references, low), high)

@@ -111,6 +111,17 @@ def test_references_by_hand():
     np.testing.assert_allclose(swim, [0.0, SWIM_LEAD, -3.0, 0.0], atol=1e-6)
 
 
+def test_a_dive_waits_for_the_column_and_for_rest():
+    policy = StraightLine.for_env(gym.make(EXPERIMENTS[0], num_obstacles=1))
+    gate, below = [5.0, 0.0, GATE, 0.3], [5.0, 0.0, -GATE, 0.3]
+    over = observation((5.0, 0.1, GATE), (5.0, 0.0, -3.0))
+    np.testing.assert_allclose(policy.predict(over)[0], below, atol=1e-6)
+    aside = observation((5.0, 0.5, GATE), (5.0, 0.0, -3.0))
+    np.testing.assert_allclose(policy.predict(aside)[0], gate, atol=1e-6)
+    over["state"][6] = 0.2  # m/s
+    np.testing.assert_allclose(policy.predict(over)[0], gate, atol=1e-6)
+
+
 def test_obstacles_change_nothing():
     env = gym.make(EXPERIMENTS[0])
     policy = StraightLine.for_env(env)

@@ -1,0 +1,117 @@
+"""How everything here is measured: warmed up, in turn (A B A B ...), in CPU seconds of this process, medians.
+
+Wall-clock time on a shared machine swings by more than what is compared; CPU time and turns of a fraction of a second
+leave ratios that repeat within a few percent.
+"""
+
+import dataclasses
+import json
+import os
+import platform
+import statistics
+import subprocess
+import time
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = Path(__file__).resolve().parent / "results"
+
+
+@dataclasses.dataclass
+class Contestant:
+    """Something to measure: `run` does a turn's smallest share of work and returns how many units it did."""
+
+    name: str
+    run: Callable[[], float]
+    rates: list[float] = dataclasses.field(default_factory=list)  # units per CPU second, one a turn
+
+    @property
+    def rate(self) -> float:
+        """Median over the turns."""
+        return statistics.median(self.rates)
+
+    @property
+    def spread(self) -> float:
+        """Half the distance between the quartiles, as a share of the median."""
+        if len(self.rates) < 4:
+            return float("nan")
+        low, _, high = statistics.quantiles(self.rates, n=4)
+        return (high - low) / 2.0 / self.rate
+
+
+def turn(run: Callable[[], float], seconds: float, clock: Callable[[], float] = time.process_time) -> float:
+    """Call `run` for so many seconds of a clock; return units per second."""
+    units, start = 0.0, clock()
+    while True:
+        units += run()
+        elapsed = clock() - start
+        if elapsed >= seconds:
+            return units / elapsed
+
+
+def in_turns(
+    contestants: list[Contestant],
+    rounds: int,
+    seconds: float,
+    clock: Callable[[], float] = time.process_time,
+) -> None:
+    """Measure contestants in turn, after one warm-up call each."""
+    for contestant in contestants:
+        contestant.run()
+    for _ in range(rounds):
+        for contestant in contestants:
+            contestant.rates.append(turn(contestant.run, seconds, clock))
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _commit() -> str:
+    """Commit of the sources, with '+' when they differ from it."""
+    git = ["git", "-C", str(ROOT)]
+    try:
+        name = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True)
+        changes = subprocess.run(
+            [*git, "status", "--porcelain", "--", "hydrone_gym", "planners"], capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return name.stdout.strip() + ("+" if changes.stdout.strip() else "")
+
+
+def machine(packages: tuple[str, ...] = ("numpy", "numba", "gymnasium")) -> dict[str, Any]:
+    """What a figure means nothing without: processor, cores, versions, commit, date."""
+    versions = {"python": platform.python_version()}
+    for package in packages:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "absent"
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "load": [round(value, 2) for value in os.getloadavg()] if hasattr(os, "getloadavg") else None,
+        "versions": versions,
+        "commit": _commit(),
+        "date": time.strftime("%Y-%m-%d"),
+    }
+
+
+def save(name: str, command: str, measured: dict[str, Any]) -> Path:
+    """Write a measurement with its machine and command to results/NAME.json."""
+    RESULTS.mkdir(exist_ok=True)
+    path = RESULTS / f"{name}.json"
+    record = {"command": command, "machine": machine(), **measured}
+    path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    return path
