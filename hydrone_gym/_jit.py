@@ -5,12 +5,14 @@ cache. Three rules hold everywhere and are the reason for this file:
 
 * no ``fastmath``: results must be equal bit for bit between one row, many rows, and a planner's tree edge;
 * the NumPy error model: a division by zero gives ``inf`` instead of a branch, which keeps loops over lanes vectorised;
-* the cache is keyed by the text of *all* kernel sources. Numba's stock cache looks only at the file of the outermost
-  function and goes stale when a function it inlines is edited in another file.
+* the cache is keyed by the source of a kernel's module and of every module that one imports. Numba's stock cache looks
+  only at the file of the outermost function and goes stale when a function it inlines is edited in another file.
 """
 
+import functools
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -19,46 +21,64 @@ from typing import Any
 import numba
 import numpy as np
 
-_PACKAGES = ("hydrone_gym", "planners")
+_ROOT = Path(__file__).resolve().parent.parent
+_IMPORT = re.compile(r"^\s*from ((?:hydrone_gym|planners|agents)[\w.]*) import", re.MULTILINE)
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False}
 
 
-def _fingerprint() -> str:
-    """Hash of every kernel source, the compiler, and NumPy: the name of the cache directory."""
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            text = path.read_bytes()
-            if b"_jit import" in text:
-                digest.update(path.relative_to(root).as_posix().encode())
-                digest.update(text)
-    return digest.hexdigest()[:16]
-
-
-def _cache_directory() -> str | None:
-    """A writable directory for compiled kernels, or None when there is none (then nothing is cached)."""
-    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "hydrone_gym"
-    for candidate in (base, Path(tempfile.gettempdir()) / f"hydrone_gym-{os.getuid() if hasattr(os, 'getuid') else 0}"):
-        directory = candidate / _fingerprint()
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(directory, os.W_OK):
-            return str(directory)
+def _source(module: str) -> Path | None:
+    """File of a module of this project, None if there is none."""
+    path = _ROOT.joinpath(*module.split("."))
+    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
+        if candidate.is_file():
+            return candidate
     return None
 
 
-CACHE_DIRECTORY = _cache_directory()
+@functools.cache
+def _imported(module: str) -> frozenset[str]:
+    """The project's modules that a module imports by name."""
+    path = _source(module)
+    return frozenset() if path is None else frozenset(_IMPORT.findall(path.read_text(encoding="utf-8")))
+
+
+@functools.cache
+def _fingerprint(module: str) -> str:
+    """Hash of the compiler, NumPy, and the source of a module and of all it imports, however deep."""
+    seen: set[str] = set()
+    waiting = {module}
+    while waiting:
+        seen |= waiting
+        waiting = {name for found in waiting for name in _imported(found)} - seen
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    for name in sorted(seen):
+        path = _source(name)
+        digest.update(name.encode() + (b"" if path is None else path.read_bytes()))
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def cache_root() -> Path | None:
+    """A writable directory for compiled kernels, or None when there is none (then nothing is cached)."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hydrone_gym"
+    owner = os.getuid() if hasattr(os, "getuid") else 0
+    for candidate in (home, Path(tempfile.gettempdir()) / f"hydrone_gym-{owner}"):
+        try:
+            candidate.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(candidate, os.W_OK):
+            return candidate
+    return None
 
 
 def kernel(function: Callable) -> Callable:
     """Compile an entry point: a function that Python calls, cached on disk."""
     dispatcher = numba.njit(**_OPTIONS)(function)
-    if CACHE_DIRECTORY is not None:
+    root = cache_root()
+    if root is not None:
         before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = CACHE_DIRECTORY
+        numba.config.CACHE_DIR = str(root / _fingerprint(function.__module__))
         try:
             dispatcher.enable_caching()
         finally:

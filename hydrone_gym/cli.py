@@ -17,7 +17,7 @@ import gymnasium as gym
 import numpy as np
 import tyro
 
-from hydrone_gym._jit import CACHE_DIRECTORY
+from hydrone_gym._jit import cache_root
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
@@ -143,7 +143,8 @@ class Fly:
 
 def _announce_compiling() -> None:
     """Say why nothing seems to happen when no kernel has been compiled yet."""
-    if CACHE_DIRECTORY is None or not any(Path(CACHE_DIRECTORY).rglob("*.nbi")):
+    root = cache_root()
+    if root is None or not any(root.rglob("*.nbi")):
         print(_COMPILING, file=sys.stderr, flush=True)
 
 

@@ -140,7 +140,7 @@ def test_what_the_parser_refuses_gives_2(arguments, capsys):
 
 
 def test_compiling_is_announced_only_without_a_cache(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(cli, "CACHE_DIRECTORY", str(tmp_path))
+    monkeypatch.setattr(cli, "cache_root", lambda: tmp_path)
     cli._announce_compiling()
     assert capsys.readouterr().err == f"{cli._COMPILING}\n"
     (tmp_path / "module").mkdir()

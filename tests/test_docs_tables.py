@@ -53,7 +53,7 @@ def resolve(path):
     raise ModuleNotFoundError(path)
 
 
-def tests_in(node):
+def functions_in(node):
     tree = ast.parse((ROOT / node).read_text(encoding="utf-8"))
     return {item.name for item in ast.walk(tree) if isinstance(item, ast.FunctionDef) and item.name.startswith("test_")}
 
@@ -67,7 +67,7 @@ def test_function_exists(path):
 def test_test_exists(node):
     file, _, function = node.partition("::")
     assert (ROOT / file).is_file()
-    functions = tests_in(file)
+    functions = functions_in(file)
     assert function in functions if function else functions
 
 

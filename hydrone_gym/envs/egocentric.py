@@ -137,7 +137,7 @@ def _write_vehicle(out, n, s, reference, goal, cosine, sine, p):
     along, across = cosine, sine
     for side in range(19, 23):  # ahead, behind, left, right
         out[n, side] = _clip(_WALL * leave_box(x, y, z, along, across, 0.0, p))
-        along, across = (-across, along) if side == 20 else (-along, -across)
+        along, across = (across, -along) if side == 20 else (-along, -across)
     out[n, 23], out[n, 24] = _clip(_WALL * (p.z_max - z)), _clip(_WALL * (z - p.z_min))
     out[n, 25], out[n, 26] = _clip(_COARSE * np.sqrt(across2)), _clip(_COARSE * abs(dz))
 

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from hydrone_gym._jit import inlined
+from hydrone_gym._jit import inlined, routine
 
 REACH = 4.0  # m: beyond the sensor's 3 m, because what was seen stays known
 AZIMUTHS = 12  # counter-clockwise from the frame's x'
@@ -23,7 +23,8 @@ def _fixed_directions() -> np.ndarray:
         np.stack([math.cos(e) * np.cos(around), math.cos(e) * np.sin(around), np.full(AZIMUTHS, math.sin(e))])
         for e in map(math.radians, ELEVATIONS)
     ]
-    return np.concatenate([*rings, [[0.0, 0.0], [0.0, 0.0], [1.0, -1.0]]], axis=1)
+    rays = np.concatenate([*rings, [[0.0, 0.0], [0.0, 0.0], [1.0, -1.0]]], axis=1)
+    return np.where(abs(rays) < 1e-12, 0.0, rays)  # the cosine of a right angle: a ray along a wall must not leave
 
 
 # Kernels read the three rows as constants.
@@ -108,7 +109,7 @@ def cast_fixed(out, n, first, state, cosine, sine, known, found, box, radius):
                 out[n, first + k] = min(out[n, first + k], np.float32(share))
 
 
-@inlined
+@routine
 def cast_along(n, state, vx, vy, vz, known, found, box, radius):
     """Share of the reach that is free along a vector (any length, world frame); 1 if it is shorter than `STILL`."""
     length = np.sqrt(vx * vx + vy * vy + vz * vz)

@@ -54,11 +54,11 @@ def unpack_egocentric(v):
 
 @inlined
 def mission_frame(start_x, start_y, goal_x, goal_y):
-    """Cosine and sine of the azimuth of x'."""
+    """Cosine and sine of the azimuth of x'; of the world's x where start and goal (m) give none."""
     dx, dy = goal_x - start_x, goal_y - start_y
     length = np.sqrt(dx * dx + dy * dy)
-    vertical = length < 1e-6
-    return (1.0 if vertical else dx / length), (0.0 if vertical else dy / length)
+    level = 1e-6 <= length < np.inf
+    return (dx / length if level else 1.0), (dy / length if level else 0.0)
 
 
 @inlined

@@ -124,5 +124,6 @@ def _world_env(env: gym.Env) -> HydroneEnv:
 def _trace(env: HydroneEnv, start: NDArray[np.float64], references: NDArray[np.float64]) -> Trace:
     """Play the references again, tick by tick: the same kernel, so the same flight bit for bit."""
     row = row_at(start, np.array(env.scenario.goal))
-    times, states, moving, _ = trajectory(env.simulation, row, references, env.scenario.obstacles)
+    obstacles = env.scenario.obstacles.copy()  # read-only arrays would compile the kernel once more
+    times, states, moving, _ = trajectory(env.simulation, row, references, obstacles)
     return Trace(times, states, moving)

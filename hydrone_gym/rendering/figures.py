@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LOWER = (-10.0, -10.0, -5.0)  # m: the box of the paper's experiments
 UPPER = (10.0, 10.0, 10.0)
 FORMATS = ("png", "pdf")
-_DASH = 0.3  # m: dashes of a path under water
+_DASH, _GAP = 0.3, 0.21  # m: a path under water
 
 
 def camera_azimuth(start: Sequence[float], goal: Sequence[float]) -> float:
@@ -55,7 +55,7 @@ def plot_path(
     scene.spheres(detected, style.DETECTED)
     air, water = split_media(positions)
     scene.lines(air, style.RED, 2.8, hidden=0.5)
-    scene.lines([dash for line in water for dash in _dashes(line)], style.RED, 2.8, hidden=0.5)
+    scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
     crossings = crossing_points(positions)
     for number, point in enumerate(crossings):
         scene.ring(point, "" if number else "crossing of the surface")
@@ -149,12 +149,15 @@ def crossing_points(positions: NDArray[np.float64]) -> NDArray[np.float64]:
     return points
 
 
-def _dashes(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Cut dashes out of a polyline (n, 3) by its length: a dash pattern would restart in every piece of the scene."""
+def dash(line: NDArray[np.float64], length: float, gap: float) -> list[NDArray[np.float64]]:
+    """Cut dashes of a length out of a polyline (n, 3), a gap apart, all in m along the line.
+
+    A dash pattern of Matplotlib would restart in every piece of the scene.
+    """
     along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
     dashes = []
-    for begin in np.arange(0.0, along[-1], 1.7 * _DASH):
-        end = min(begin + _DASH, along[-1])
+    for begin in np.arange(0.0, along[-1], length + gap):
+        end = min(begin + length, along[-1])
         inside = along[(along > begin) & (along < end)]
         samples = np.concatenate(([begin], inside, [end]))
         dashes.append(np.column_stack([np.interp(samples, along, line[:, axis]) for axis in range(3)]))

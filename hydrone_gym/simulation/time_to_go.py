@@ -12,6 +12,7 @@ from hydrone_gym._jit import inlined
 
 GATE = 1.1  # m: crossings begin and end this far from the surface
 _SETTLE = 2.0  # s: coming to rest above or below the surface before a crossing
+SETTLE_SHARE = _SETTLE / (2.0 * GATE)  # s/m: that time spread over the height of a crossing
 _CRUISE = 0.9  # share of the limit speed that a flight with turns and stops averages
 
 
@@ -54,6 +55,6 @@ def time_to_go(x, y, z, goal_x, goal_y, goal_z, speeds):
     in_air = max(across / speeds.air, max(air_height - GATE, 0.0) / speeds.climb)
     in_water = max(-GATE - water_height, 0.0) / speeds.dive
     inside = min(air_height, GATE) - max(water_height, -GATE)
-    changing = in_air + in_water + inside * (1.0 / speeds.zone + _SETTLE / (2.0 * GATE))
+    changing = in_air + in_water + inside * (1.0 / speeds.zone + SETTLE_SHARE)
     same = same_air if from_air else same_water
     return same if from_air == to_air else changing

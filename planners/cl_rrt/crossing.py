@@ -11,7 +11,6 @@ from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.simulation.time_to_go import cruise_speeds
 from hydrone_gym.world.obstacles import swept_distance
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, inside
@@ -63,10 +62,9 @@ def column_is_free(work, x, y, radius, margin):
 
 
 @routine
-def cross(work, values, goal, source, size, sample_x, sample_y, margin, ticks):
+def cross(work, values, goal, source, size, sample_x, sample_y, objective, margin, ticks):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     model = unpack_model(values)
-    speeds = cruise_speeds(model)
     period = ticks * TICK
     s = work.nodes[source].state
     down = s[2] > 0.0
@@ -91,7 +89,7 @@ def cross(work, values, goal, source, size, sample_x, sample_y, margin, ticks):
         result, crossed = edge(work, values, goal, current, size, x, y, gate, psi, margin, ticks)
         if result == BLOCKED or crossed:
             return first
-        adopt(work, goal, speeds, current, size, SETTLING, result == ARRIVED, period)
+        adopt(work, goal, objective, current, size, SETTLING, result == ARRIVED)
         work.nodes[size].next = size + 1
         current = size
         size += 1
@@ -110,7 +108,7 @@ def cross(work, values, goal, source, size, sample_x, sample_y, margin, ticks):
         z = work.nodes[size].state[2]
         through = (z > 0.0) != down and abs(z) > model.world.zone + _CLEAR_OF_ZONE
         kind = OPEN if through or result == ARRIVED else CROSSING
-        adopt(work, goal, speeds, current, size, kind, result == ARRIVED, period)
+        adopt(work, goal, objective, current, size, kind, result == ARRIVED)
         work.nodes[size].next = -1 if kind == OPEN else size + 1
         current = size
         size += 1

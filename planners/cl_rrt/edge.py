@@ -3,11 +3,11 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym.simulation.advance import advance
+from hydrone_gym.simulation.advance import TICK, advance
 from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rows import load_vehicle, store_vehicle
-from hydrone_gym.simulation.time_to_go import time_to_go
+from planners.cl_rrt.objective import cost_to_go
 
 # How an edge ended
 BLOCKED = 0
@@ -29,6 +29,7 @@ def edge(work, values, goal, source, slot, rx, ry, rz, psi, margin, ticks):
     bounds, a rough crossing, or divergence.
     """
     model = unpack_model(values)
+    work.edges[0] += 1
     b = work.block[0]
     start, end = work.nodes[source], work.nodes[slot]
     rx, ry, rz, psi = float(np.float32(rx)), float(np.float32(ry)), float(np.float32(rz)), float(np.float32(psi))
@@ -52,12 +53,18 @@ def edge(work, values, goal, source, slot, rx, ry, rz, psi, margin, ticks):
 
 
 @inlined
-def adopt(work, goal, speeds, parent, slot, kind, arrived, period):
-    """Make the end of an edge in `slot` a node of the tree."""
-    node = work.nodes[slot]
+def adopt(work, goal, objective, parent, slot, kind, arrived):
+    """Make the end of the edge propagated last, in `slot`, a node of the tree."""
+    node, b = work.nodes[slot], work.block[0]
+    before = work.nodes[parent]
     s = node.state
     node.parent, node.next, node.kind = parent, -1, kind
     node.dead, node.unsafe, node.tried = 0, 0, 0
     node.goal = 1 if arrived else 0
-    node.time = work.nodes[parent].time + period
-    node.to_go = 0.0 if arrived else time_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], speeds)
+    dx, dy, dz = s[0] - before.state[0], s[1] - before.state[1], s[2] - before.state[2]
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    seconds = b.ticks[0] * TICK
+    spent = objective.per_second * seconds + objective.per_joule * b.energy[0] + objective.per_metre * length
+    node.time = before.time + seconds
+    node.cost = before.cost + spent
+    node.to_go = 0.0 if arrived else cost_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], objective)

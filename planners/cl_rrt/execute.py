@@ -7,16 +7,17 @@ a stop, send it; prune and choose again where that fails; else go on with the st
 import numpy as np
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.simulation.time_to_go import cruise_speeds, time_to_go
 from hydrone_gym.world.obstacles import swept_distance
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.expand import expand_tree
+from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.references import hover_reference
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, copy_node, prune_orphans, reroot
 
 _BEND = 0.1  # m: how far an edge may leave its chord
+_AT_GOAL = 1e9  # any path that arrives is better than any that does not
+_DETOUR = 0.05  # share of the cost-to-come that tells apart branches that end equally near
 _FULL = 0.8  # share of the tree's capacity
 _GIVE = 0.02  # m: how much nearer than now an edge may come when the vehicle is within the margin
 _LEAST_MARGIN = 0.005  # m
@@ -24,7 +25,7 @@ _DRIFT_TIME = 12.0  # s: sway is unactuated in water, so what is left of it at t
 
 
 @inlined
-def take_root(work, size, goal, speeds, now, root):
+def take_root(work, size, goal, objective, now, root):
     """Root the tree where the vehicle is: at the predicted node if there is one, with the observed state in it."""
     if root >= 0 and root < size:
         size = reroot(work.nodes, size, root, work.path)
@@ -38,8 +39,8 @@ def take_root(work, size, goal, speeds, now, root):
     for c in range(4):
         n.integral[c] = now[12 + c]
         n.reference[c] = now[16 + c]
-    n.time, n.unsafe, n.tried, n.dead = 0.0, 0, 0, 0
-    n.to_go = time_to_go(now[0], now[1], now[2], goal[0], goal[1], goal[2], speeds)
+    n.time, n.cost, n.unsafe, n.tried, n.dead = 0.0, 0.0, 0, 0, 0
+    n.to_go = cost_to_go(now[0], now[1], now[2], goal[0], goal[1], goal[2], objective)
     return size
 
 
@@ -105,14 +106,14 @@ def margin_here(work, radius, settings):
 
 @inlined
 def best_node(work, size):
-    """Return the end of the best path: least time at the goal, else least time-to-go among safe nodes; -1 if none."""
+    """Return the end of the best path: least cost at the goal, else least cost-to-go among safe nodes; -1 if none."""
     best, least = -1, np.inf
     fallback, fallback_least = -1, np.inf
     for i in range(1, size):
         n = work.nodes[i]
         if n.dead:
             continue
-        score = n.time - 1e6 if n.goal else n.to_go + 0.05 * n.time
+        score = n.cost - _AT_GOAL if n.goal else n.to_go + _DETOUR * n.cost
         if n.unsafe and not n.goal:
             if score < fallback_least:
                 fallback, fallback_least = i, score
@@ -134,7 +135,7 @@ def trim(work, size):
 
 
 @inlined
-def re_propagate(work, values, goal, speeds, end, margin, ticks):
+def re_propagate(work, values, goal, objective, end, margin, ticks):
     """Propagate the path to node `end` again from the root; return its first node, or minus the node that fails."""
     depth = 0
     i = end
@@ -142,7 +143,6 @@ def re_propagate(work, values, goal, speeds, end, margin, ticks):
         work.path[depth] = i
         depth += 1
         i = work.nodes[i].parent
-    period = ticks * TICK
     for k in range(depth - 1, -1, -1):
         i = work.path[k]
         n = work.nodes[i]
@@ -154,28 +154,28 @@ def re_propagate(work, values, goal, speeds, end, margin, ticks):
         result, crossed = edge(work, values, goal, n.parent, i, r0, r1, r2, r3, 0.5 * margin, ticks)
         if result == BLOCKED or (crossed and not may_cross):
             return -i
-        adopt(work, goal, speeds, n.parent, i, n.kind, result == ARRIVED, period)
+        adopt(work, goal, objective, n.parent, i, n.kind, result == ARRIVED)
         n.next, n.unsafe, n.tried = kept_next, kept_unsafe, kept_tried
     return work.path[depth - 1]
 
 
 @inlined
-def sensed(work, slot, origin, reach):
-    """Whether a node lies in space sensed from the vehicle's position: nothing unknown can be in the way there."""
-    s, o = work.nodes[slot].state, work.nodes[origin].state
-    dx, dy, dz = s[0] - o[0], s[1] - o[1], s[2] - o[2]
+def sensed(work, slot, eye, reach):
+    """Whether a node lies in space sensed from `eye` (3,): nothing unknown can be in the way there."""
+    s = work.nodes[slot].state
+    dx, dy, dz = s[0] - eye[0], s[1] - eye[1], s[2] - eye[2]
     return dx * dx + dy * dy + dz * dz <= reach * reach
 
 
 @inlined
-def verify_stop(work, values, goal, first, settings, margin, ticks, model, scratch):
+def verify_stop(work, values, goal, eye, first, settings, margin, ticks, model, scratch):
     """Check that node `first` can be followed to rest in known free space; write the references to `backup`.
 
     An open or settling node stops by hovering; inside a crossing the stop is the rest of the crossing, then hovering.
     The clearance kept is `margin` (m). Returns the number of references, 0 if the stop fails.
     """
     reach = model.world.sensor_range - model.vehicle.radius
-    if not sensed(work, first, 0, reach):
+    if not sensed(work, first, eye, reach):
         return 0
     if work.nodes[first].goal:
         return 1
@@ -188,7 +188,7 @@ def verify_stop(work, values, goal, first, settings, margin, ticks, model, scrat
         result, _ = edge(work, values, goal, scratch, scratch, r0, r1, r2, r3, margin, ticks)
         if result == BLOCKED:
             return 0
-        if not sensed(work, scratch, 0, reach) or count >= BACKUP - 1:
+        if not sensed(work, scratch, eye, reach) or count >= BACKUP - 1:
             return 0
         for c in range(4):
             work.backup[count, c] = work.nodes[scratch].reference[c]
@@ -196,7 +196,7 @@ def verify_stop(work, values, goal, first, settings, margin, ticks, model, scrat
     rx, ry, rz, psi = hover_reference(work.nodes[scratch], model)
     for _ in range(settings.look_ahead):
         result, crossed = edge(work, values, goal, scratch, scratch, rx, ry, rz, psi, margin, ticks)
-        if result == BLOCKED or crossed or not sensed(work, scratch, 0, reach):
+        if result == BLOCKED or crossed or not sensed(work, scratch, eye, reach):
             return 0
         if result == ARRIVED:
             break
@@ -211,61 +211,82 @@ def verify_stop(work, values, goal, first, settings, margin, ticks, model, scrat
 
 
 @inlined
-def choose(work, values, goal, size, settings, margin, ticks, model, speeds, scratch):
+def choose(work, values, goal, eye, size, settings, objective, margin, ticks, model, scratch):
     """Choose, re-propagate and verify until a path's first edge may be sent (Alg. 2, lines 10-18).
 
-    Returns (first node of the path or -1, length of its backup).
+    Returns (first node of the path or -1, length of its backup, end of the path).
     """
     for _ in range(size):
         end = best_node(work, size)
         if end < 0:
             break
-        first = re_propagate(work, values, goal, speeds, end, margin, ticks)
+        first = re_propagate(work, values, goal, objective, end, margin, ticks)
         if first < 0:
             work.nodes[-first].dead = 1
             prune_orphans(work.nodes, size)
             continue
-        stop = verify_stop(work, values, goal, first, settings, min(margin, settings.rest_margin), ticks, model, scratch)
+        stop = verify_stop(
+            work, values, goal, eye, first, settings, min(margin, settings.rest_margin), ticks, model, scratch
+        )
         if stop > 0:
-            return first, stop
+            return first, stop, end
         work.nodes[first].dead = 1
         prune_orphans(work.nodes, size)
-    return -1, 0
+    return -1, 0, -1
 
 
 @kernel
-def cycle(work, values, goal, now, size, root, known_before, draws, iterations, settings, roam, ticks, begin, finish):
+def cycle(
+    work,
+    values,
+    goal,
+    now,
+    eye,
+    size,
+    root,
+    known_before,
+    draws,
+    iterations,
+    settings,
+    objective,
+    roam,
+    ticks,
+    begin,
+    finish,
+):
     """Run one cycle, or a part of one.
 
     Args:
         work: `Workspace`; changed in place.
         values: packed `Model`.
         goal: (3,) m.
-        now: (20,) observed state, controller memory, reference in force.
+        now: (20,) state, controller memory and reference in force where the first edge begins.
+        eye: (3,) where the obstacles were last sensed from, m.
         size: nodes in use.
         root: predicted node to root the tree at, -1 to begin a new tree.
         known_before: obstacles the tree was grown with.
         draws: uniform numbers for `expand_tree`.
         iterations: samples to grow by.
         settings: `SettingParams`.
+        objective: `ObjectiveParams`.
         roam: see `expand_tree`.
         ticks: ticks a period.
         begin, finish: whether this part takes in the observation, and whether it chooses.
 
     Returns:
-        (size, first, stop): nodes in use, the node to send (-1: use the backup), references in its backup.
+        (size, first, stop, end): nodes in use, the node to send (-1: use the backup), references in its backup, and
+        the node its path ends at.
     """
     model = unpack_model(values)
-    speeds = cruise_speeds(model)
     if begin:
-        size = take_root(work, size, goal, speeds, now, root)
+        size = take_root(work, size, goal, objective, now, root)
     margin = margin_here(work, model.vehicle.radius, settings)
     if begin:
         prune_blocked(work, size, known_before, model.vehicle.radius, margin)
         size = trim(work, size) if size > _FULL * work.path.size else size
-    size = expand_tree(work, values, goal, size, draws, iterations, settings, margin, roam, ticks)
-    first, stop = -1, 0
+    size = expand_tree(work, values, goal, size, draws, iterations, settings, objective, margin, roam, ticks)
+    first, stop, end = -1, 0, -1
     if finish:
         scratch = work.nodes.size - 1
-        first, stop = choose(work, values, goal, size, settings, margin, ticks, model, speeds, scratch)
-    return size, first, stop
+        first, stop, end = choose(work, values, goal, eye, size, settings, objective, margin, ticks, model, scratch)
+    return size, first, stop, end

@@ -6,9 +6,10 @@ from hydrone_gym._jit import inlined, routine
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.simulation.time_to_go import cruise_speeds, time_to_go
+from hydrone_gym.simulation.time_to_go import cruise_speeds
 from planners.cl_rrt.crossing import cross, facing
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
+from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, air_reference, water_reference
 from planners.cl_rrt.tree import OPEN
 
@@ -65,10 +66,10 @@ def draw_column(draws, k, root, goal, roam, settings, model):
 
 
 @inlined
-def next_node(work, size, x, y, z, to_goal, from_air, any_medium, by_cost, stamp, speeds):
-    """Return the best untried open node for a point, or -1: nearest, or least cost-to-come plus time (sorted order)."""
+def next_node(work, size, x, y, z, to_goal, from_air, by_cost, stamp, objective):
+    """Return the best untried open node for a point, or -1: nearest, or least cost-to-come plus cost (sorted order)."""
     best, least = -1, np.inf
-    speed = speeds.air if from_air else speeds.water
+    rate = objective.rates.air if from_air else objective.rates.water
     for i in range(size):
         n = work.nodes[i]
         if n.dead or n.kind != OPEN or n.goal or work.path[i] == stamp:
@@ -76,19 +77,19 @@ def next_node(work, size, x, y, z, to_goal, from_air, any_medium, by_cost, stamp
         if to_goal:
             if n.tried:
                 continue
-            score = n.to_go + (n.time if by_cost else 0.0)
+            score = n.to_go + (n.cost if by_cost else 0.0)
         else:
-            if not any_medium and (n.state[2] > 0.0) != from_air:
+            if (n.state[2] > 0.0) != from_air:
                 continue
             dx, dy, dz = n.state[0] - x, n.state[1] - y, n.state[2] - z
-            score = np.sqrt(dx * dx + dy * dy + dz * dz) / speed + (n.time if by_cost else 0.0)
+            score = np.sqrt(dx * dx + dy * dy + dz * dz) / rate + (n.cost if by_cost else 0.0)
         if score < least:
             best, least = i, score
     return best
 
 
 @routine
-def extend(work, values, goal, source, size, x, y, z, limit, margin, ticks):
+def extend(work, values, goal, source, size, x, y, z, limit, settings, objective, margin, ticks):
     """Connect a node to a sample by edges of one period, crossing if the media differ (Alg. 1, lines 3-17).
 
     Returns the new size. Nodes of an extension that runs into something are kept and marked unsafe.
@@ -104,13 +105,18 @@ def extend(work, values, goal, source, size, x, y, z, limit, margin, ticks):
         air = node.state[2] > 0.0
         change = air != (z > 0.0)
         aim_z = (AIR_GATE if air else -WATER_GATE) if change else z
-        dx, dy, dz = x - node.state[0], y - node.state[1], aim_z - node.state[2]
+        aim_x, aim_y = x, y
+        if change and objective.paper > 0.0:
+            share = (node.state[2] - aim_z) / (node.state[2] - z)
+            aim_x = node.state[0] + share * (x - node.state[0])
+            aim_y = node.state[1] + share * (y - node.state[1])
+        dx, dy, dz = aim_x - node.state[0], aim_y - node.state[1], aim_z - node.state[2]
         across2 = dx * dx + dy * dy
         if change:
             speed = np.sqrt(node.state[6] * node.state[6] + node.state[7] * node.state[7])
             near = (0.3 + 0.45 * speed) if air else _WATER_REACHED
             if across2 < near * near and abs(dz) < 0.7:
-                grown = cross(work, values, goal, current, size, x, y, margin, ticks)
+                grown = cross(work, values, goal, current, size, x, y, objective, margin, ticks)
                 if grown == size:
                     break
                 size = grown
@@ -123,17 +129,17 @@ def extend(work, values, goal, source, size, x, y, z, limit, margin, ticks):
             if across2 + dz * dz < near * near:
                 break
         if air:
-            psi = facing(x, y, goal[0], goal[1], node.reference[3]) if goal[2] < 0.0 else node.reference[3]
-            rx, ry, rz, psi = air_reference(node, x, y, aim_z, psi, model, period)
+            psi = facing(aim_x, aim_y, goal[0], goal[1], node.reference[3]) if goal[2] < 0.0 else node.reference[3]
+            rx, ry, rz, psi = air_reference(node, aim_x, aim_y, aim_z, psi, model, settings.step, period)
         else:
-            rx, ry, rz, psi = water_reference(node, x, y, aim_z, speeds, model, period)
+            rx, ry, rz, psi = water_reference(node, aim_x, aim_y, aim_z, speeds, model, period)
         result, crossed = edge(work, values, goal, current, size, rx, ry, rz, psi, margin, ticks)
         if result == BLOCKED or crossed:
             for i in range(first, size):
                 work.nodes[i].unsafe = 1
             work.nodes[source].unsafe = 1 if size == first else work.nodes[source].unsafe
             break
-        adopt(work, goal, speeds, current, size, OPEN, result == ARRIVED, period)
+        adopt(work, goal, objective, current, size, OPEN, result == ARRIVED)
         current = size
         size += 1
         if result == ARRIVED:
@@ -142,17 +148,17 @@ def extend(work, values, goal, source, size, x, y, z, limit, margin, ticks):
 
 
 @inlined
-def least_time(work, size):
-    """Return the least time of a node at the goal, infinite if there is none."""
+def least_cost(work, size):
+    """Return the least cost of a node at the goal, infinite if there is none."""
     least = np.inf
     for i in range(size):
         if work.nodes[i].goal and not work.nodes[i].dead:
-            least = min(least, work.nodes[i].time)
+            least = min(least, work.nodes[i].cost)
     return least
 
 
 @routine
-def expand_tree(work, values, goal, size, draws, iterations, settings, margin, roam, ticks):
+def expand_tree(work, values, goal, size, draws, iterations, settings, objective, margin, roam, ticks):
     """Expand the tree by a number of samples (Alg. 1); return its new size.
 
     Args:
@@ -163,23 +169,24 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, margin, r
         draws: (iterations * DRAWS,) uniform numbers.
         iterations: samples.
         settings: `SettingParams`.
+        objective: `ObjectiveParams`.
         margin: clearance in m that edges keep.
         roam: 1 to try crossings even if root and goal share a medium: the way out of a pocket may lead through the
             other one.
         ticks: ticks a period.
     """
     model = unpack_model(values)
-    speeds = cruise_speeds(model)
     root = work.nodes[0]
     change = roam != 0 or (root.state[2] > 0.0) != (goal[2] > 0.0)
     for i in range(work.path.size):
         work.path[i] = -1
-    best = least_time(work, size)
+    paper = objective.paper > 0.0
+    best = np.inf if paper else least_cost(work, size)
     for iteration in range(iterations):
         k = iteration * DRAWS
-        kind, by_cost = draws[k], draws[k + 1] < 0.5
+        kind, by_cost = draws[k], draws[k + 1] < 0.5 and not paper
         to_goal = kind < settings.goal_bias
-        column = not to_goal and change and kind < settings.goal_bias + settings.column_bias
+        column = not to_goal and change and (not paper or roam != 0) and kind < settings.goal_bias + settings.column_bias
         if to_goal:
             x, y, z = goal[0], goal[1], goal[2]
             from_air = z > 0.0
@@ -189,23 +196,24 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, margin, r
         else:
             air = (goal[2] > 0.0) if not change else draws[k + 1] * 2.0 % 1.0 < 0.5
             x, y, z = draw_point(draws, k, root, goal, air, model)
-            from_air = air
-        beyond = time_to_go(x, y, z, goal[0], goal[1], goal[2], speeds)
+            # as printed, a sample in the other medium is reached through the surface where the line meets it
+            from_air = root.state[2] > 0.0 if paper else air
+        beyond = cost_to_go(x, y, z, goal[0], goal[1], goal[2], objective)
         for _ in range(settings.tries):
-            i = next_node(work, size, x, y, z, to_goal, from_air, False, by_cost, iteration, speeds)
+            i = next_node(work, size, x, y, z, to_goal, from_air, by_cost, iteration, objective)
             if i < 0:
                 break
             work.path[i] = iteration
             n = work.nodes[i]
             n.tried = 1 if to_goal else n.tried
             # a sample that cannot beat the best path, even in an empty world, is not worth an edge
-            if n.time + time_to_go(n.state[0], n.state[1], n.state[2], x, y, z, speeds) + beyond >= best:
+            if n.cost + cost_to_go(n.state[0], n.state[1], n.state[2], x, y, z, objective) + beyond >= best:
                 continue
             limit = _GOAL_EXTENSION if to_goal else settings.extension
-            grown = extend(work, values, goal, i, size, x, y, z, limit, margin, ticks)
+            grown = extend(work, values, goal, i, size, x, y, z, limit, settings, objective, margin, ticks)
             if grown > size:
                 size = grown
-                if work.nodes[size - 1].goal:
-                    best = min(best, work.nodes[size - 1].time)
+                if work.nodes[size - 1].goal and not paper:
+                    best = min(best, work.nodes[size - 1].cost)
                 break
     return size

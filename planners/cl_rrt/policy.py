@@ -1,17 +1,20 @@
-"""The CL-RRT as a policy: what travels between cycles, and the budget of each."""
+"""The CL-RRT as a policy: Algorithm 2's loop over periods, and the budget of each."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.simulation import Simulation, row_at
 from planners.cl_rrt.execute import cycle
 from planners.cl_rrt.expand import DRAWS
+from planners.cl_rrt.memory import Memory, Report, first_memory
+from planners.cl_rrt.objective import objective_params
 from planners.cl_rrt.settings import CLRRTSettings
-from planners.cl_rrt.tree import BACKUP, new_nodes, new_workspace
+from planners.cl_rrt.stopping import safe_speed
+from planners.cl_rrt.tree import Workspace, new_workspace
 from planners.policy import Known, Observation, PlannerPolicy, known, simulation_of
 
 _CHUNK = 8  # samples between looks at the clock
@@ -19,26 +22,12 @@ _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this 
 _PATIENCE = 8  # cycles without a path before crossings are tried that the mission does not need
 
 
-@dataclass(frozen=True)
-class Memory:
-    """What one environment's planner remembers between periods; never changed once returned."""
-
-    nodes: np.ndarray  # the tree
-    size: int
-    root: int  # node predicted for the next observation, -1 if none
-    known: int  # obstacles the tree was grown with
-    backup: NDArray[np.float64]  # verified references that end in a stop
-    stop: int  # how many of them
-    cycle: int
-    waiting: int = 0  # cycles since a path was last sent
-
-
 class TreeView(NamedTuple):
     """A tree as arrays, for looking at it."""
 
     edges: NDArray[np.float64]  # (E, 2, 3) reference at the parent and at the node, m
     air: NDArray[np.bool_]  # (E,) whether the node lies in air
-    time: NDArray[np.float64]  # (E,) cost-to-come, s
+    time: NDArray[np.float64]  # (E,) s from the root
     path: NDArray[np.intp]  # edges of the best path to the goal, in order; empty if none
 
 
@@ -46,17 +35,22 @@ class CLRRT(PlannerPolicy):
     """Closed-loop RRT for a vehicle that flies and dives (paper, Algs. 1 and 2), as a recurrent policy.
 
     Every edge it sends was propagated with the environment's own kernel and verified to be followed by a stop in
-    sensed free space, so the vehicle never hits an obstacle it could sense in time.
+    sensed free space, so the vehicle never hits an obstacle it could sense in time. The state returned by `predict`
+    holds one `Memory` an environment, with the last cycle's `Report`.
 
     Args:
         simulation: model, world and period to plan with.
         iterations: samples a cycle; results then depend on the seed alone.
         time_budget: seconds a cycle may take instead (the paper's real-time loop; not reproducible).
+        objective: what a path costs: "time" (s), "energy" (J), "length" (m), or "paper": the branch that ends closest
+            to the goal, crossing where the line to a sample meets the transition zone.
+        latency: True to use in each period what was planned during the one before, from the predicted state, as a
+            vehicle must whose planning takes a whole period; it flies slower, to stop within what it sensed then.
         seed: of the random stream; every episode starts it anew.
         settings: see `CLRRTSettings`.
 
     Raises:
-        ValueError: a budget that is not positive.
+        ValueError: a budget that is not positive, an unknown objective.
     """
 
     def __init__(
@@ -65,22 +59,29 @@ class CLRRT(PlannerPolicy):
         *,
         iterations: int = 60,
         time_budget: float | None = None,
+        objective: str = "time",
+        latency: bool = False,
         seed: int = 0,
         settings: CLRRTSettings | None = None,
     ) -> None:
-        """Check the budget and flatten the settings."""
+        """Check the budget, flatten the settings and measure how fast the vehicle may fly and still stop."""
         if isinstance(iterations, bool) or not isinstance(iterations, int) or iterations < 1:
             raise ValueError(f"iterations must be a whole number of at least 1, got {iterations!r}")
         if time_budget is not None and not 0.0 < time_budget < np.inf:
             raise ValueError(f"time_budget must be positive (s), got {time_budget!r}")
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
             raise ValueError(f"seed must be a whole number that is not negative, got {seed!r}")
+        if not isinstance(latency, bool):
+            raise ValueError(f"latency must be True or False, got {latency!r}")
         self.simulation = simulation
         self.iterations = iterations
         self.time_budget = time_budget
+        self.latency = latency
         self.seed = seed
         self.settings = CLRRTSettings() if settings is None else settings
-        self._params = self.settings.params()
+        self._objective = objective_params(simulation, objective)
+        self.cruise_speed = safe_speed(simulation, 2 if latency else 1)
+        self._params = self.settings.params(self.cruise_speed * simulation.period)
 
     @classmethod
     def for_env(
@@ -89,68 +90,108 @@ class CLRRT(PlannerPolicy):
         *,
         iterations: int = 60,
         time_budget: float | None = None,
+        objective: str = "time",
+        latency: bool = False,
         seed: int = 0,
         settings: CLRRTSettings | None = None,
     ) -> "CLRRT":
         """Make a planner for an environment, with its vehicle, world and period; arguments as for the class."""
-        simulation = simulation_of(env)
-        return cls(simulation, iterations=iterations, time_budget=time_budget, seed=seed, settings=settings)
+        return cls(
+            simulation_of(env),
+            iterations=iterations,
+            time_budget=time_budget,
+            objective=objective,
+            latency=latency,
+            seed=seed,
+            settings=settings,
+        )
 
     def act(self, now: Known, memory: Memory | None) -> tuple[NDArray[np.float64], Memory]:
         """Run one cycle of the execution loop (Alg. 2); return the reference (4,) and the new memory."""
-        if memory is None:
-            backup = np.tile(now.reference, (BACKUP, 1))
-            memory = Memory(new_nodes(self.settings.max_nodes), 0, -1, 0, backup, 1, 0)
-        work = new_workspace(memory.nodes.copy(), now.obstacles, memory.backup.copy())
-        size, first, stop = self._run(work, now, memory)
-        if first < 0:
-            return self._safety_action(memory)
-        reference = work.nodes["reference"][first].copy()
-        count = len(now.obstacles)
-        return reference, Memory(work.nodes, size, first, count, work.backup, stop, memory.cycle + 1)
+        memory = first_memory(self.settings.max_nodes, now.reference) if memory is None else memory
+        if not self.latency:
+            return self._decide(now, now.state[:3], memory)
+        sending = now.reference if memory.pending is None else memory.pending
+        reference, memory = self._decide(self._ahead(now, sending), now.state[:3], memory)
+        return sending, replace(memory, pending=reference)
 
-    def _run(self, work: Any, now: Known, memory: Memory) -> tuple[int, int, int]:
-        """Grow and choose within the budget."""
+    def _ahead(self, now: Known, sending: NDArray[np.float64]) -> Known:
+        """Predict the end of this period under the reference sent now (Alg. 2, lines 4-8)."""
+        row = row_at(now.state, now.goal)
+        row["integral"], row["reference"] = now.integral, now.reference
+        sent = np.float32(sending).astype(np.float64)
+        self.simulation.advance(row, sent[None], np.zeros((1, 0)), np.zeros((1, 0)), 0)
+        return now._replace(state=row["state"][0], integral=row["integral"][0], reference=sent)
+
+    def _decide(
+        self, start: Known, eye: NDArray[np.float64], memory: Memory
+    ) -> tuple[NDArray[np.float64], Memory]:
+        """Plan from `start` with what was sensed from `eye`; return the reference for the period that begins there."""
         started = time.perf_counter()
-        observed = np.concatenate([now.state, now.integral, now.reference])
+        work = new_workspace(memory.nodes.copy(), start.obstacles, memory.backup.copy())
+        size, first, stop, end = self._run(work, start, eye, memory, started)
+        if first < 0:
+            return self._safety_action(memory, size, int(work.edges[0]), time.perf_counter() - started)
+        nodes, depth, i = work.nodes, 0, end
+        while i > 0:
+            depth, i = depth + 1, int(nodes["parent"][i])
+        cost = float(nodes["cost"][end] + nodes["to_go"][end])
+        seconds = time.perf_counter() - started
+        report = Report(size, int(work.edges[0]), depth, cost, bool(nodes["goal"][end]), seconds, 0)
+        known_now = len(start.obstacles)
+        memory = Memory(nodes, work.backup, stop, size, first, known_now, memory.cycle + 1, 0, None, report)
+        return nodes["reference"][first].copy(), memory
+
+    def _run(
+        self, work: Workspace, start: Known, eye: NDArray[np.float64], memory: Memory, started: float
+    ) -> tuple[int, int, int, int]:
+        """Grow and choose within the budget."""
+        observed = np.concatenate([start.state, start.integral, start.reference])
         random = np.random.Generator(np.random.Philox(key=self.seed, counter=memory.cycle))
         root = memory.root
-        if root >= 0 and np.abs(memory.nodes["state"][root][:3] - now.state[:3]).max() > _MOVED:
+        if root >= 0 and np.abs(memory.nodes["state"][root][:3] - start.state[:3]).max() > _MOVED:
             root = -1
+        roam = int(memory.waiting >= _PATIENCE)
         size, begin, done = memory.size, True, False
         while not done:
             if self.time_budget is None:
                 samples, done = self.iterations, True
             else:
-                samples = _CHUNK
-                done = time.perf_counter() - started > self.time_budget
-            size, first, stop = cycle(
+                samples, done = _CHUNK, time.perf_counter() - started > self.time_budget
+            size, first, stop, end = cycle(
                 work,
                 self.simulation.values,
-                now.goal,
+                start.goal,
                 observed,
+                eye,
                 size,
                 root,
                 memory.known,
                 random.random(samples * DRAWS),
                 samples,
                 self._params,
-                int(memory.waiting >= _PATIENCE),
+                self._objective,
+                roam,
                 self.simulation.ticks,
                 begin,
                 done,
             )
             begin = False
-        return size, first, stop
+        return size, first, stop, end
 
     @staticmethod
-    def _safety_action(memory: Memory) -> tuple[NDArray[np.float64], Memory]:
+    def _safety_action(
+        memory: Memory, size: int, edges: int, seconds: float
+    ) -> tuple[NDArray[np.float64], Memory]:
         """Go on with the stop verified last; its final reference holds for good."""
-        reference = memory.backup[0].copy()
-        backup, stop = memory.backup, memory.stop
+        reference, backup, stop = memory.backup[0].copy(), memory.backup, memory.stop
         if stop > 1:
             backup, stop = np.roll(backup, -1, axis=0), stop - 1
-        return reference, Memory(memory.nodes, 0, -1, 0, backup, stop, memory.cycle + 1, memory.waiting + 1)
+        waiting = memory.waiting + 1
+        report = Report(size, edges, 0, np.inf, False, seconds, waiting)
+        return reference, Memory(
+            memory.nodes, backup, stop, cycle=memory.cycle + 1, waiting=waiting, report=report
+        )
 
     def grow_tree(self, observation: Observation, iterations: int) -> TreeView:
         """Grow a tree from one observation without flying, as in the paper's Fig. 5.
@@ -159,17 +200,14 @@ class CLRRT(PlannerPolicy):
             observation: Dict observation; put every sphere of the scenario into `obstacles` to plan with a known map.
             iterations: samples.
         """
-        now = known(observation)
-        work = new_workspace(new_nodes(self.settings.max_nodes), now.obstacles, np.zeros((BACKUP, 4)))
-        observed = np.concatenate([now.state, now.integral, now.reference])
-        draws = np.random.default_rng(self.seed).random(iterations * DRAWS)
-        values, ticks = self.simulation.values, self.simulation.ticks
-        size, _, _ = cycle(
-            work, values, now.goal, observed, 0, -1, 0, draws, iterations, self._params, 0, ticks, True, False
-        )
+        start = known(observation)
+        memory = first_memory(self.settings.max_nodes, start.reference)
+        work = new_workspace(memory.nodes, start.obstacles, memory.backup)
+        grower = CLRRT(self.simulation, iterations=iterations, seed=self.seed, settings=self.settings)
+        size = grower._run(work, start, start.state[:3], memory, 0.0)[0]
         nodes = work.nodes[:size]
         edges = np.stack([nodes["reference"][nodes["parent"][1:], :3], nodes["reference"][1:, :3]], axis=1)
-        ends = np.flatnonzero(nodes["goal"])
+        ends = np.flatnonzero((nodes["goal"] == 1) & (nodes["dead"] == 0))
         path: list[int] = []
         i = int(ends[np.argmin(nodes["time"][ends])]) if len(ends) else 0
         while i > 0:

@@ -5,11 +5,11 @@ import numpy as np
 from hydrone_gym._jit import inlined
 from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import sincos
+from planners.cl_rrt.stopping import AHEAD_AIR, AHEAD_WATER
 
 AIR_GATE = 1.1  # m above the surface: crossings begin or end here; from 1.4 m the exit would lie beyond sensing
 WATER_GATE = 1.0  # m below the surface
 _LEAD = 1.5  # m the reference may be ahead of the vehicle: a reference that runs away drags it through obstacles
-_STEP_SHARE = 0.95  # of the speed limit, so that the controller can catch up
 _CLIMB = 0.6  # m of height an edge of 0.5 s may change
 _CARROT_TIME = 1.4  # s of travel ahead under water
 _CARROT_TURNING = 0.6  # m ahead while misaligned: beyond the hold radius, too near to swim an arc
@@ -24,15 +24,14 @@ def inside(value, low, high):
 
 
 @inlined
-def air_reference(node, gx, gy, gz, psi, model, period):
-    """Step the reference linearly toward a point in air, at most one period of travel and `_LEAD` from the vehicle."""
+def air_reference(node, gx, gy, gz, psi, model, step, period):
+    """Step the reference linearly toward a point in air, at most `step` m on and `_LEAD` from the vehicle."""
     w = model.world
     x, y, z = node.state[0], node.state[1], node.state[2]
     ox, oy, oz = node.reference[0], node.reference[1], node.reference[2]
     dx, dy, dz = gx - ox, gy - oy, gz - oz
     length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    reach = _STEP_SHARE * model.air_gains.speed_limit * period
-    scale = min(1.0, reach / max(length, 1e-9), _CLIMB * period / 0.5 / max(abs(dz), 1e-9))
+    scale = min(1.0, step / max(length, 1e-9), _CLIMB * period / 0.5 / max(abs(dz), 1e-9))
     rx, ry, rz = ox + scale * dx, oy + scale * dy, oz + scale * dz
     lx, ly, lz = rx - x, ry - y, rz - z
     lead = np.sqrt(lx * lx + ly * ly + lz * lz)
@@ -69,7 +68,7 @@ def hover_reference(node, model):
     w = model.world
     s = node.state
     air = s[2] > 0.0
-    ahead = 0.2 if air else 0.1
+    ahead = AHEAD_AIR if air else AHEAD_WATER
     psi = node.reference[3] if air else s[5]
     rz = s[2] + ahead * s[8]
     rz = max(rz, AIR_GATE) if air else min(rz, -WATER_GATE)

@@ -17,6 +17,7 @@ class SettingParams(NamedTuple):
     tries: int
     extension: int
     look_ahead: int
+    step: float  # m an edge in air may move its reference: the safe speed times the period
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +65,6 @@ class CLRRTSettings:
             if not isinstance(value, int) or value < least:
                 raise ValueError(f"CLRRTSettings.{name} must be a whole number of at least {least}, got {value!r}")
 
-    def params(self) -> SettingParams:
-        """Flatten for the kernels."""
-        return SettingParams(*(getattr(self, name) for name in SettingParams._fields))
+    def params(self, step: float) -> SettingParams:
+        """Flatten for the kernels; `step` (m) is how far an edge in air may move its reference."""
+        return SettingParams(*(getattr(self, name) for name in SettingParams._fields[:-1]), step)

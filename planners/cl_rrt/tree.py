@@ -18,8 +18,9 @@ NODE = np.dtype(
         ("state", np.float64, (12,)),
         ("integral", np.float64, (4,)),
         ("reference", np.float64, (4,)),
-        ("time", np.float64),  # cost-to-come, s
-        ("to_go", np.float64),  # cost-to-go, s
+        ("time", np.float64),  # since the root, s
+        ("cost", np.float64),  # cost-to-come, in units of the objective
+        ("to_go", np.float64),  # cost-to-go
         ("parent", np.int64),
         ("next", np.int64),  # successor inside a crossing, else -1
         ("kind", np.int64),
@@ -39,7 +40,8 @@ class Workspace(NamedTuple):
     log: NDArray[np.float64]
     closest: NDArray[np.float64]  # (obstacles,)
     obstacles: NDArray[np.float64]  # (4 * obstacles,) flat
-    path: NDArray[np.int64]  # (capacity,)
+    path: NDArray[np.int64]  # (capacity + 1,)
+    edges: NDArray[np.int64]  # (1,) edges propagated so far
     backup: NDArray[np.float64]  # (BACKUP, 4) verified references that end in a stop
 
 
@@ -56,7 +58,7 @@ def new_workspace(nodes: np.ndarray, obstacles: NDArray[np.float64], backup: NDA
     log = np.zeros((1, LOGGED_CROSSINGS, len(CROSSING_FIELDS)))
     closest = np.zeros(len(obstacles))
     path = np.zeros(len(nodes), np.int64)
-    return Workspace(nodes, new_block(1), log, closest, obstacles.reshape(-1), path, backup)
+    return Workspace(nodes, new_block(1), log, closest, obstacles.reshape(-1), path, np.zeros(1, np.int64), backup)
 
 
 @inlined
@@ -68,7 +70,7 @@ def copy_node(nodes, source, target):
     for c in range(4):
         b.integral[c] = a.integral[c]
         b.reference[c] = a.reference[c]
-    b.time, b.to_go, b.parent, b.next = a.time, a.to_go, a.parent, a.next
+    b.time, b.cost, b.to_go, b.parent, b.next = a.time, a.cost, a.to_go, a.parent, a.next
     b.kind, b.dead, b.unsafe, b.goal, b.tried = a.kind, a.dead, a.unsafe, a.goal, a.tried
 
 
@@ -83,13 +85,13 @@ def prune_orphans(nodes, size):
 @inlined
 def reroot(nodes, size, root, path):
     """Keep only the living subtree of `root`, packed to the front; return its size. `path` is scratch."""
-    start = nodes[root].time
+    start, spent = nodes[root].time, nodes[root].cost
     for i in range(size):
         path[i] = -1
     path[root] = 0
     copy_node(nodes, root, 0)
     nodes[0].parent = -1
-    nodes[0].time = 0.0
+    nodes[0].time, nodes[0].cost = 0.0, 0.0
     kept = 1
     for i in range(root + 1, size):
         parent = path[nodes[i].parent]
@@ -98,6 +100,7 @@ def reroot(nodes, size, root, path):
             copy_node(nodes, i, kept)
             nodes[kept].parent = parent
             nodes[kept].time -= start
+            nodes[kept].cost -= spent
             kept += 1
     for i in range(kept):
         if nodes[i].next >= 0:

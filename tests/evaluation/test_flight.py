@@ -1,6 +1,8 @@
 """`fly` against a loop written by hand, and its record against independent sums."""
 
 import math
+import subprocess
+import sys
 
 import gymnasium as gym
 import numpy as np
@@ -52,6 +54,24 @@ def test_trace_is_the_flight_bit_for_bit(flown):
     np.testing.assert_array_equal(flight.trace.states[-1], flight.states[-1])
     assert flight.trace.times[-1] == pytest.approx(flight.time, abs=1e-9)
     np.testing.assert_allclose(flight.trace.references[ticks::ticks, :3], flight.references[:, :3][: len(whole) - 1])
+
+
+def test_the_trace_compiles_no_kernel_anew():
+    """In a process of its own, because signatures stay: a read-only array, say, would cost seconds of compiling."""
+    program = """if True:
+        import gymnasium as gym
+        from hydrone_gym.evaluation import fly
+        from hydrone_gym.simulation.rows import advance_rows
+        from planners import StraightLine
+        env = gym.make("HydroneGym/AirToWater-v0")
+        env.reset(seed=0)
+        env.step([0.0, 0.0, 5.0, 0.0])
+        before = list(advance_rows.signatures)
+        fly(env, StraightLine.for_env(env), seed=0)
+        print(len(before), len(advance_rows.signatures))
+    """
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)
+    assert result.stdout.split() == ["1", "1"]
 
 
 def test_length_is_the_sum_of_the_ways_between_ticks(flown):

@@ -245,7 +245,7 @@ def test_bad_settings():
         CLRRTSettings(max_nodes=7)
     with pytest.raises(TypeError, match="unknown"):
         CLRRTSettings(unknown=1)
-    assert dataclasses.replace(CLRRTSettings(), margin=0.2).params().margin == 0.2
+    assert dataclasses.replace(CLRRTSettings(), margin=0.2).params(1.0).margin == 0.2
 
 
 def test_bad_input():

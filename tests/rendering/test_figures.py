@@ -1,5 +1,6 @@
 """Figures are drawn from arrays: counted in pixels, by colour."""
 
+import itertools
 import subprocess
 import sys
 
@@ -9,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.figures import crossing_points, plot_path, plot_tree, save_figure, split_media
+from hydrone_gym.rendering.figures import crossing_points, dash, plot_path, plot_tree, save_figure, split_media
 from hydrone_gym.rendering.histories import plot_attitude, plot_position
 from hydrone_gym.rendering.scene3d import Scene
 
@@ -65,6 +66,11 @@ def test_path_under_water_is_dashed_and_tinted(dive):
     dry = pixels(plot_path(path + [0.0, 0.0, 5.0], path[-1], NOTHING, NOTHING))
     wet = pixels(plot_path(path - [0.0, 0.0, 4.9], path[-1], NOTHING, NOTHING))
     assert count(wet, style.RED) < 0.75 * count(dry, style.RED)
+    dashes = dash(path, 0.3, 0.21)
+    lengths = [np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in dashes]
+    np.testing.assert_allclose(lengths[:-1], 0.3)
+    gaps = [np.linalg.norm(b[0] - a[-1]) for a, b in itertools.pairwise(dashes)]
+    np.testing.assert_allclose(gaps, 0.21)
 
 
 def test_near_hides_far():
@@ -158,6 +164,7 @@ def test_equal_flights_give_equal_files(dive, tmp_path):
         assert [file.name for file in written] == [f"{name}.png", f"{name}.pdf"]
     for suffix in ("png", "pdf"):
         assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
+    assert b"CreationDate" not in (tmp_path / "a.pdf").read_bytes()
 
 
 def test_matplotlib_is_loaded_only_to_draw():

@@ -1,0 +1,163 @@
+"""The CL-RRT as the paper prints it, for comparison with the one that is made safe."""
+
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.rows import new_rows
+from hydrone_gym.simulation.simulation import Simulation
+from planners.cl_rrt.execute import cycle
+from planners.cl_rrt.expand import DRAWS
+from planners.cl_rrt.objective import objective_params
+from planners.cl_rrt.settings import CLRRTSettings
+from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, new_nodes, new_workspace
+from planners.policy import Known, PlannerPolicy, simulation_of
+
+_ORDER = 1  # the draw that chooses between nearest and least cost; from 0.5 on it is nearest
+_SPEED_SHARE = 0.95  # of the speed limit, at which references move in air
+_COLUMN_RADIUS = 10.0  # m: samples beyond the surface, all over the box
+_FULL = 0.75  # share of its capacity at which a tree starts anew
+
+
+class PublishedMemory(NamedTuple):
+    """What one environment's planner remembers between periods; never changed once returned."""
+
+    nodes: np.ndarray  # the tree
+    size: int
+    root: int  # node to root the tree at, -1 for a new tree
+    known: int  # spheres the tree was pruned with
+    cycle: int
+
+
+class PublishedCLRRT(PlannerPolicy):
+    """CL-RRT with the printed Algorithms 1 and 2 and nothing that was added to make `CLRRT` safe and quick.
+
+    The tree grows from the nearest node, without a margin, and crosses where the line to a sample meets the transition
+    zone. It is kept from cycle to cycle, rooted where the vehicle is (Alg. 2, line 1). The branch that ends closest to
+    the goal is re-propagated and sent if it is free, else pruned and another one chosen (lines 10-18). Where no branch
+    ends closer than the vehicle is already, the vehicle hovers (line 12).
+
+    What is left out of `CLRRT`: the stop check, so a branch may lead to where no stop is possible once something new is
+    sensed; the verified backup, so the hover is not checked either; branch choice and node order by cost; margins; the
+    way out of a pocket through the other medium. Edges and the vertical crossing are those of `CLRRT`, with its cures
+    for a reference that runs away from the vehicle: this is the same planner less its safety, and no literal copy.
+
+    Args:
+        simulation: model, world and period to plan with.
+        iterations: samples a cycle.
+        seed: of the random stream; every episode starts it anew.
+
+    Raises:
+        ValueError: a budget or seed out of range.
+    """
+
+    def __init__(self, simulation: Simulation, *, iterations: int = 60, seed: int = 0) -> None:
+        """Check the budget; settings without margin and with columns all over the box."""
+        for name, number, least in (("iterations", iterations, 1), ("seed", seed, 0)):
+            if isinstance(number, bool) or not isinstance(number, int) or number < least:
+                raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
+        self.iterations, self.seed = iterations, seed
+        self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
+        self._settings = CLRRTSettings(margin=0.0, column_radius=_COLUMN_RADIUS)
+        speed = _SPEED_SHARE * simulation.vehicle.air_gains.speed_limit
+        self._params = self._settings.params(speed * simulation.period)
+        self._objective = objective_params(simulation, "paper")
+
+    @classmethod
+    def for_env(cls, env: Any, *, iterations: int = 60, seed: int = 0) -> Self:
+        """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
+        return cls(simulation_of(env), iterations=iterations, seed=seed)
+
+    def act(self, now: Known, memory: PublishedMemory | None) -> tuple[NDArray[np.float64], PublishedMemory]:
+        """Run one cycle of the execution loop; return the reference (4,) and the new memory."""
+        if memory is None:
+            memory = PublishedMemory(new_nodes(self._settings.max_nodes), 0, -1, 0, 0)
+        count = len(now.obstacles)
+        nodes, size = self._grow(now, memory)
+        while (end := _closest(nodes[:size])) > 0:
+            failed = self._propagate(nodes, end, now)
+            if failed < 0:
+                first = _path(nodes, end)[0]
+                return nodes["reference"][first].copy(), PublishedMemory(nodes, size, first, count, memory.cycle + 1)
+            _prune(nodes[:size], failed)
+        # no path: the tree waits with the vehicle and goes on growing
+        return _hover(now), PublishedMemory(nodes, size, 0, count, memory.cycle + 1)
+
+    def _grow(self, now: Known, memory: PublishedMemory) -> tuple[np.ndarray, int]:
+        """Root the tree at the vehicle, prune what new spheres block, and expand it; return a new tree."""
+        work = new_workspace(memory.nodes.copy(), now.obstacles, np.zeros((BACKUP, 4)))
+        random = np.random.Generator(np.random.Philox(key=self.seed, counter=memory.cycle))
+        draws = random.random(self.iterations * DRAWS)
+        draws[_ORDER::DRAWS] = 0.5 + 0.5 * draws[_ORDER::DRAWS]
+        observed = np.concatenate([now.state, now.integral, now.reference])
+        root = memory.root if memory.size < _FULL * len(memory.nodes) else -1
+        size, *_ = cycle(
+            work,
+            self._simulation.values,
+            now.goal,
+            observed,
+            now.state[:3],
+            memory.size,
+            root,
+            memory.known,
+            draws,
+            self.iterations,
+            self._params,
+            self._objective,
+            0,
+            self._simulation.ticks,
+            True,
+            False,  # choosing is done here
+        )
+        return work.nodes, size
+
+    def _propagate(self, nodes: np.ndarray, end: int, now: Known) -> int:
+        """Propagate the branch to node `end` again from the root, into the nodes; return the node that fails or -1."""
+        row = new_rows(1)
+        row["state"], row["integral"], row["reference"] = now.state, now.integral, now.reference
+        row["goal"], row["clearance"] = now.goal, np.inf
+        spheres, closest = now.obstacles.reshape(1, -1), np.full((1, len(now.obstacles)), np.inf)
+        for i in _path(nodes, end):
+            node, before = nodes[i], row["crossings"][0]
+            self._simulation.advance(row, node["reference"][None].copy(), spheres, closest, len(now.obstacles))
+            vertical = node["kind"] == CROSSING or nodes["kind"][node["parent"]] == CROSSING
+            if row["outcome"][0] not in (Outcome.RUNNING, Outcome.GOAL) or (row["crossings"][0] > before and not vertical):
+                return int(i)
+            node["state"], node["integral"] = row["state"][0], row["integral"][0]
+            if row["outcome"][0] == Outcome.GOAL:
+                break
+        return -1
+
+
+def _closest(tree: np.ndarray) -> int:
+    """Return the node closest to the goal where a path may end, 0 (the root) if none is closer than the vehicle."""
+    open_end = (tree["kind"] == OPEN) & (tree["unsafe"] == 0)
+    distance = np.where(open_end, tree["to_go"], np.inf)  # the paper's cost-to-go is the distance
+    distance[tree["goal"] != 0] = 0.0
+    distance[tree["dead"] != 0] = np.inf
+    distance[0] = tree["to_go"][0]
+    return int(np.argmin(distance))
+
+
+def _path(nodes: np.ndarray, end: int) -> list[int]:
+    """Return the nodes from the root's child to node `end`."""
+    path = [end]
+    while nodes["parent"][path[-1]] > 0:
+        path.append(int(nodes["parent"][path[-1]]))
+    return path[::-1]
+
+
+def _prune(tree: np.ndarray, top: int) -> None:
+    """Mark a node and all that hangs on it dead; parents come before their children."""
+    tree["dead"][top] = 1
+    for i in range(top + 1, len(tree)):
+        tree["dead"][i] |= tree["dead"][tree["parent"][i]]
+
+
+def _hover(now: Known) -> NDArray[np.float64]:
+    """The safety action: stay where the vehicle is, a little ahead along its velocity."""
+    air = now.state[2] > 0.0
+    ahead = now.state[:3] + (0.2 if air else 0.1) * now.state[6:9]
+    return np.append(ahead, now.reference[3] if air else now.state[5])
