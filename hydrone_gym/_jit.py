@@ -72,7 +72,7 @@ def cache_root() -> Path | None:
     return None
 
 
-def kernel(function: Callable) -> Callable:
+def kernel(function: Callable) -> Any:
     """Compile an entry point: a function that Python calls, cached on disk."""
     dispatcher = numba.njit(**_OPTIONS)(function)
     root = cache_root()
@@ -86,7 +86,7 @@ def kernel(function: Callable) -> Callable:
     return dispatcher
 
 
-def inlined(function: Callable) -> Callable:
+def inlined(function: Callable) -> Any:
     """Compile a building block that LLVM must inline into every caller.
 
     Without forced inlining a loop over lanes is compiled to one scalar call a lane, three times slower.
@@ -94,6 +94,6 @@ def inlined(function: Callable) -> Callable:
     return numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
 
 
-def routine(function: Callable) -> Callable:
+def routine(function: Callable) -> Any:
     """Compile a large function that other kernels call: one copy of its code, not inlined, not cached by itself."""
     return numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)

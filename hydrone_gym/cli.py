@@ -17,12 +17,13 @@ import gymnasium as gym
 import numpy as np
 import tyro
 
-from hydrone_gym._jit import cache_root
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
+from hydrone_gym.simulation.rows import advance_rows
 from hydrone_gym.world.scenario import Scenario, load_scenario
 from planners import CLRRT, StraightLine
+from planners.cl_rrt.execute import cycle
 
 EXPERIMENTS = {1: "HydroneGym/AirToWater-v0", 2: "HydroneGym/WaterToAir-v0"}
 _TREE_ITERATIONS = 400  # samples of the tree figure
@@ -96,14 +97,14 @@ class Fly:
         if self.policy != "clrrt" and (self.iterations is not None or self.time_budget is not None):
             raise ValueError("--iterations and --time-budget are options of --policy clrrt")
         if self.scenario is None:
-            _announce_compiling()
+            self._announce_compiling()
             numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
             count = 20 if self.obstacles is None else self.obstacles
             return [self._mission(f"experiment-{number}", EXPERIMENTS[number], count, None) for number in numbers]
         if self.experiment is not None or self.obstacles is not None:
             raise ValueError("--scenario excludes --experiment and --obstacles")
         scenario = load_scenario(self.scenario)
-        _announce_compiling()
+        self._announce_compiling()
         return [self._mission(self.scenario.stem, "HydroneGym/Mission-v0", len(scenario.obstacles), scenario)]
 
     def _mission(self, name: str, env_id: str, obstacles: int, scenario: Scenario | None) -> Mission:
@@ -118,6 +119,13 @@ class Fly:
         if self.iterations is None:
             return CLRRT.for_env(env, time_budget=self.time_budget, seed=self.seed)
         return CLRRT.for_env(env, iterations=self.iterations, seed=self.seed)
+
+    def _announce_compiling(self) -> None:
+        """Say why nothing seems to happen when the large kernels have not been compiled yet."""
+        kernels = (advance_rows, cycle) if self.policy == "clrrt" else (advance_rows,)
+        folders = [kernel.stats.cache_path for kernel in kernels]
+        if not all(folder and any(Path(folder).glob("*.nbi")) for folder in folders):
+            print(_COMPILING, file=sys.stderr, flush=True)
 
     def _draw(self, mission: Mission, flight: Flight, step: Callable[[str], None]) -> list[Path]:
         """Write the figures of one mission; return their paths."""
@@ -139,13 +147,6 @@ class Fly:
         _print_table(records)
         for path in [*(path for record in records for path in record["figures"]), saved]:
             print(path)
-
-
-def _announce_compiling() -> None:
-    """Say why nothing seems to happen when no kernel has been compiled yet."""
-    root = cache_root()
-    if root is None or not any(root.rglob("*.nbi")):
-        print(_COMPILING, file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -27,7 +27,7 @@ def _check_numbers(instance: object) -> None:
         for entry in entries:
             if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
                 raise ValueError(f"{where} must be a finite number ({unit}), got {value!r}")
-            if sign == "positive" and entry <= 0 or sign == "not negative" and entry < 0:
+            if (sign == "positive" and entry <= 0) or (sign == "not negative" and entry < 0):
                 raise ValueError(f"{where} must be {sign} ({unit}), got {value!r}")
 
 

@@ -36,7 +36,11 @@ class Plan(NamedTuple):
 
 @kernel
 def add_costs(
-    rows: np.ndarray, values: NDArray[np.float64], before: NDArray[np.float64], weight: float, costs: NDArray[np.float64]
+    rows: np.ndarray,
+    values: NDArray[np.float64],
+    before: NDArray[np.float64],
+    weight: float,
+    costs: NDArray[np.float64],
 ) -> None:
     """Add one period's cost to `costs` (n,): time-to-go times a weight, and roughness.
 
@@ -64,10 +68,11 @@ class MPPI(PlannerPolicy):
     plan, adds smooth noise, flies every sample in closed loop through the simulation kernel against the known spheres,
     and averages the samples by exp(-cost / temperature). The cost is time-to-go, nearness to spheres, lateral speed in
     the transition zone and failure, all in seconds. Among the samples are the straight line, holding still, and leaving
-    the transition zone either way. As an average of two ways round a sphere may hit it, it is flown again beside the best samples, and the least cost wins.
+    the transition zone either way. As an average of two ways round a sphere may hit it, it is flown again beside the
+    best samples, and the least cost wins.
 
-    What it cannot do: see past its horizon or out of a local minimum of time-to-go, such as a pocket; promise
-    anything about space not sensed yet, since no stop is verified. It plans through known and unknown alike.
+    What it cannot do: see past its horizon or out of a local minimum of time-to-go, such as a pocket or a sphere over
+    the place where it came out of the water; promise anything about space not sensed yet, as no stop is verified.
 
     Args:
         simulation: supplies vehicle, world and period.
@@ -87,8 +92,8 @@ class MPPI(PlannerPolicy):
         self.samples, self.horizon, self.seed = samples, horizon, seed
         self._simulation = simulation
         self._line = StraightLine(simulation)
-        self._low = np.float32(simulation.world.lower).astype(np.float64)
-        self._high = np.float32(simulation.world.upper).astype(np.float64)
+        self._low = np.array(simulation.world.lower, np.float32).astype(np.float64)
+        self._high = np.array(simulation.world.upper, np.float32).astype(np.float64)
 
     @classmethod
     def for_env(cls, env: Any, *, samples: int = 256, horizon: int = 10, seed: int = 0) -> Self:

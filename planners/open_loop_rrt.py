@@ -42,9 +42,9 @@ class OpenLoopRRT(PlannerPolicy):
     """RRT with straight edges (LaValle, 1998), tracked by a reference that moves along the path at cruise speed.
 
     Edges clear the known spheres, inflated by the vehicle's radius and a margin; both ends of an edge lie in one medium
-    outside the transition zone, or it is a vertical crossing from gate to gate. The first path found is shortened corner
-    to corner and flown until a newly detected sphere blocks what is left of it; then a new one is planned from where
-    the vehicle is. The reference waits at a gate for the vehicle to arrive, and whenever it is `lead` ahead of it.
+    outside the transition zone, or it is a vertical crossing from gate to gate. The first path found is shortened
+    corner to corner and flown until a newly detected sphere blocks what is left of it; then a new one is planned from
+    where the vehicle is. The reference waits at a gate for the vehicle to arrive, and whenever it is `lead` ahead.
 
     This is the ablation of closed-loop prediction: nothing here knows how the vehicle lags, cuts corners, turns under
     water, or how far it needs to stop; the margin has to cover for all of that and is not proven to.
@@ -84,9 +84,7 @@ class OpenLoopRRT(PlannerPolicy):
         self._zone_speed = _CRUISE * air.zone_speed_limit
 
     @classmethod
-    def for_env(
-        cls, env: Any, *, samples: int = 1000, margin: float = 0.4, lead: float = 1.0, seed: int = 0
-    ) -> Self:
+    def for_env(cls, env: Any, *, samples: int = 1000, margin: float = 0.4, lead: float = 1.0, seed: int = 0) -> Self:
         """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
         return cls(simulation_of(env), samples=samples, margin=margin, lead=lead, seed=seed)
 

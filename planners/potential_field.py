@@ -28,8 +28,9 @@ class PotentialField(PlannerPolicy):
 
     The attraction is the straight line's reference: to the gate over the goal, vertically through the surface, on to
     the goal. A sphere with clearance rho < rho_0 repels with gain (1/rho - 1/rho_0) / rho^2, a wall likewise. Where the
-    attraction points into a sphere, a force of the same size along its surface is added (De Medio and Oriolo, 1991), and
-    near the aim repulsion fades (Ge and Cui, 2000). A column blocked by a known sphere is pushed aside; a crossing
+    attraction points into a sphere, a force of at most the attraction's size along its surface is added (De Medio
+    and Oriolo, 1991),
+    and near the aim repulsion fades (Ge and Cui, 2000). A column blocked by a known sphere is pushed aside; a crossing
     that has begun is finished. References stay within a period's travel of the vehicle. Its state is a tuple of None.
 
     What it cannot do: leave a local minimum between several spheres, keep a clearance it promises (the field knows
@@ -76,12 +77,12 @@ class PotentialField(PlannerPolicy):
         near, away = self._near(position, now.obstacles)
         if length < 1e-6 or not len(near):
             return reference, None
-        direction = self._force(pull / length, near, away, float(np.linalg.norm(aim - position)))
-        ahead = near[away @ direction < 0.0]
+        force = self._force(pull / length, near, away, length)
+        ahead = near[away @ force < 0.0]
         speed = min(1.0, max(_SLOWEST, ahead.min(initial=np.inf) / _SLOW))
         air = position[2] > 0.0
         lead = speed * min(length, self._step) if air else max(speed * SWIM_LEAD, _TURNING_LEAD)
-        reference[:3] = position + min(lead, length) * direction
+        reference[:3] = position + min(lead, length) * force
         reference[:3] = np.clip(reference[:3], self._low, self._high)
         shallow = self._world.zone + 0.1  # references stay out of the zone until the crossing
         reference[2] = max(reference[2], shallow) if air else min(reference[2], -shallow)
@@ -138,7 +139,7 @@ class PotentialField(PlannerPolicy):
     def _force(
         self, pull: NDArray[np.float64], near: NDArray[np.float64], away: NDArray[np.float64], left: float
     ) -> NDArray[np.float64]:
-        """Return the direction (3,) of attraction and repulsion together; the attraction has length 1."""
+        """Return attraction and repulsion together (3,), at most of length 1, which is that of the attraction."""
         push = self.gain * (1.0 / near - 1.0 / self.influence) / near**2 * min(1.0, left / _ARRIVING)
         into = np.maximum(-(away @ pull), 0.0)
         along = pull - (away @ pull)[:, None] * away
@@ -146,6 +147,6 @@ class PotentialField(PlannerPolicy):
         # straight into a sphere every way round is as good: take the left one
         left_hand = np.cross([0.0, 0.0, 1.0], pull) if abs(pull[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
         along = np.where(size[:, None] > 1e-3, along / np.maximum(size, 1e-9)[:, None], left_hand)
-        force = pull + (push[:, None] * (away + into[:, None] * along)).sum(axis=0)
-        total = float(np.linalg.norm(force))
-        return force / total if total > 1e-9 else pull
+        slide = np.minimum(push, 1.0) * into  # bounded, or it would draw the vehicle into a gap that is too narrow
+        force = pull + push @ away + slide @ along
+        return force / max(1.0, float(np.linalg.norm(force)))

@@ -11,6 +11,7 @@ from hydrone_gym.simulation.simulation import Simulation
 from planners.cl_rrt.execute import cycle
 from planners.cl_rrt.expand import DRAWS
 from planners.cl_rrt.objective import objective_params
+from planners.cl_rrt.references import AHEAD_AIR, AHEAD_WATER, AIR_GATE, WATER_GATE
 from planners.cl_rrt.settings import CLRRTSettings
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, new_nodes, new_workspace
 from planners.policy import Known, PlannerPolicy, simulation_of
@@ -41,8 +42,9 @@ class PublishedCLRRT(PlannerPolicy):
 
     What is left out of `CLRRT`: the stop check, so a branch may lead to where no stop is possible once something new is
     sensed; the verified backup, so the hover is not checked either; branch choice and node order by cost; margins; the
-    way out of a pocket through the other medium. Edges and the vertical crossing are those of `CLRRT`, with its cures
-    for a reference that runs away from the vehicle: this is the same planner less its safety, and no literal copy.
+    way out of a pocket through the other medium. What is kept: samples that could not shorten a path already found are
+    skipped; edges and the vertical crossing are those of `CLRRT`, with its cures for a reference that runs away from
+    the vehicle. So this is the same planner less its safety, and no literal copy.
 
     Args:
         simulation: model, world and period to plan with.
@@ -82,8 +84,9 @@ class PublishedCLRRT(PlannerPolicy):
                 first = _path(nodes, end)[0]
                 return nodes["reference"][first].copy(), PublishedMemory(nodes, size, first, count, memory.cycle + 1)
             _prune(nodes[:size], failed)
-        # no path: the tree waits with the vehicle and goes on growing
-        return _hover(now), PublishedMemory(nodes, size, 0, count, memory.cycle + 1)
+        # no path: the tree waits with the vehicle and goes on growing; from the middle of a crossing it cannot
+        root = 0 if nodes["kind"][0] == OPEN else -1
+        return _hover(now), PublishedMemory(nodes, size, root, count, memory.cycle + 1)
 
     def _grow(self, now: Known, memory: PublishedMemory) -> tuple[np.ndarray, int]:
         """Root the tree at the vehicle, prune what new spheres block, and expand it; return a new tree."""
@@ -123,7 +126,8 @@ class PublishedCLRRT(PlannerPolicy):
             node, before = nodes[i], row["crossings"][0]
             self._simulation.advance(row, node["reference"][None].copy(), spheres, closest, len(now.obstacles))
             vertical = node["kind"] == CROSSING or nodes["kind"][node["parent"]] == CROSSING
-            if row["outcome"][0] not in (Outcome.RUNNING, Outcome.GOAL) or (row["crossings"][0] > before and not vertical):
+            ended = row["outcome"][0] not in (Outcome.RUNNING, Outcome.GOAL)
+            if ended or (row["crossings"][0] > before and not vertical):
                 return int(i)
             node["state"], node["integral"] = row["state"][0], row["integral"][0]
             if row["outcome"][0] == Outcome.GOAL:
@@ -151,13 +155,17 @@ def _path(nodes: np.ndarray, end: int) -> list[int]:
 
 def _prune(tree: np.ndarray, top: int) -> None:
     """Mark a node and all that hangs on it dead; parents come before their children."""
-    tree["dead"][top] = 1
-    for i in range(top + 1, len(tree)):
-        tree["dead"][i] |= tree["dead"][tree["parent"][i]]
+    parents, dead = tree["parent"].tolist(), tree["dead"].tolist()
+    dead[top] = 1
+    for i in range(top + 1, len(dead)):
+        dead[i] |= dead[parents[i]]
+    tree["dead"] = dead
 
 
 def _hover(now: Known) -> NDArray[np.float64]:
-    """The safety action: stay where the vehicle is, a little ahead along its velocity."""
-    air = now.state[2] > 0.0
-    ahead = now.state[:3] + (0.2 if air else 0.1) * now.state[6:9]
-    return np.append(ahead, now.reference[3] if air else now.state[5])
+    """The safety action: stay where the vehicle is, a little ahead along its velocity and outside the zone."""
+    if now.state[2] > 0.0:
+        x, y, z = now.state[:3] + AHEAD_AIR * now.state[6:9]
+        return np.array([x, y, max(z, AIR_GATE), now.reference[3]])
+    x, y, z = now.state[:3] + AHEAD_WATER * now.state[6:9]
+    return np.array([x, y, min(z, -WATER_GATE), now.state[5]])

@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -140,13 +141,18 @@ def test_what_the_parser_refuses_gives_2(arguments, capsys):
 
 
 def test_compiling_is_announced_only_without_a_cache(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(cli, "cache_root", lambda: tmp_path)
-    cli._announce_compiling()
+    for name in ("advance_rows", "cycle"):
+        kernel = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / name)))
+        monkeypatch.setattr(cli, name, kernel)
+    straight, clrrt = cli.Fly(policy="straight"), cli.Fly(policy="clrrt")
+    straight._announce_compiling()
     assert capsys.readouterr().err == f"{cli._COMPILING}\n"
-    (tmp_path / "module").mkdir()
-    (tmp_path / "module" / "kernel.nbi").write_text("")
-    cli._announce_compiling()
+    (tmp_path / "advance_rows").mkdir()
+    (tmp_path / "advance_rows" / "kernel.nbi").write_text("")
+    straight._announce_compiling()
     assert capsys.readouterr().err == ""
+    clrrt._announce_compiling()
+    assert capsys.readouterr().err == f"{cli._COMPILING}\n"
 
 
 def test_the_installed_command(tmp_path):

@@ -52,7 +52,9 @@ class Load:
         rng = np.random.default_rng(1)
         self.rows = flying_rows(rng, count, share_in_air)
         self.references = near_references(rng, self.rows)
-        self.spheres = spheres_out_of_the_way(rng, count)[:, :obstacles] - (40.0 if near else 0.0) * np.array([1, 1, 1, 0])
+        self.spheres = spheres_out_of_the_way(rng, count)[:, :obstacles] - (40.0 if near else 0.0) * np.array(
+            [1, 1, 1, 0]
+        )
         self._flat = {lanes: lane_major(self.spheres, lanes) for lanes in (1, 16)}
         self._work = self.rows.copy()
         self._closest = {lanes: np.zeros((len(flat), obstacles * lanes)) for lanes, flat in self._flat.items()}

@@ -1,4 +1,4 @@
-"""Control in air: cascaded PID in rotor speed (paper eqs. 9-12; deviations E10, E11 and the speed law)."""
+"""Control in air: cascaded PID in rotor speed (paper eqs. 5-8; deviations E10, E11 and the speed law)."""
 
 from typing import NamedTuple
 

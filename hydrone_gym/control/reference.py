@@ -1,4 +1,4 @@
-"""The reference a controller tracks and its memory (paper's r, and the integrals of eqs. 10, 11, 14, 15)."""
+"""The reference a controller tracks and its memory (paper's r, and the integrals of eqs. 6, 7, 14, 15)."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ class Reference(NamedTuple):
 
 
 class Integral(NamedTuple):
-    """Controller memory: integral contributions already in output units (rpm in air, N in water), zero at a crossing."""
+    """Controller memory: integral contributions in output units (rpm in air, N in water), zero at a crossing."""
 
     z: float
     phi: float

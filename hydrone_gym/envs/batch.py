@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,8 @@ from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import REPORT, begin_rows, new_episodes, pack_task, settle
 from hydrone_gym.simulation.block import LANES
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.world.generator import draw, first_numbers, place_many, prepare
+from hydrone_gym.world.generator import draw, first_numbers, prepare
+from hydrone_gym.world.placement import place_many
 from hydrone_gym.world.scenario import Scenario
 
 _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
@@ -43,7 +45,7 @@ class EpisodeBatch:
         self.simulations = [Simulation(vehicle, world, options.period, LANES) for _ in range(threads)]
         blocks = -(-count // LANES)
         edges = [LANES * round(blocks * k / threads) for k in range(threads)] + [count]
-        self._parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self._parts = [slice(a, b) for a, b in pairwise(edges)]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def advance(self, references: NDArray[np.float64]) -> None:
@@ -58,9 +60,7 @@ class EpisodeBatch:
     def _advance_part(self, k: int, references: NDArray[np.float64]) -> None:
         part, now, count = self._parts[k], self.episodes, self.options.num_obstacles
         blocks = slice(part.start // LANES, -(-part.stop // LANES))
-        self.simulations[k].advance(
-            now.rows[part], references[part], now.obstacles[blocks], now.closest[blocks], count
-        )
+        self.simulations[k].advance(now.rows[part], references[part], now.obstacles[blocks], now.closest[blocks], count)
         settle(*now, count, LANES, self._task, self._order[part], self.report)
 
     def begin(

@@ -157,7 +157,6 @@ def observe(out, n, state, reference, goal, known, found, starts, least, clock, 
         params: `EgocentricParams`.
     """
     if least[n] == np.inf:
-        clock[n] = -1.0
         for c in range(3):
             starts[n, c] = state[c]
     remaining = time_to_go(state[0], state[1], state[2], goal[0], goal[1], goal[2], params.speeds)
@@ -261,7 +260,7 @@ class Egocentric:
         wanted = _shaped("action", action, (len(rows), 3), single)
         if not np.isfinite(wanted).all():
             raise ValueError(f"action must be finite, got {action!r}")
-        actions = np.ascontiguousarray(np.clip(wanted, -1.0, 1.0), np.float32)
+        actions = np.ascontiguousarray(wanted, np.float32)
         starts = np.ascontiguousarray(_shaped("memory.start", memory.start, (len(rows), 3), single))
         out = np.empty((len(rows), 4))
         place_references(rows, actions, starts, self.values, 0, len(rows), out)

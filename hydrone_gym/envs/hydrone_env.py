@@ -10,6 +10,8 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.envs.egocentric import egocentric_space, relative_action_space
+from hydrone_gym.envs.egocentric_rows import EgocentricRows
 from hydrone_gym.envs.info import crossings_of, info_of
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.requests import check_scenario, load_reference, requested_scenario
@@ -24,7 +26,7 @@ from hydrone_gym.world.generator import generate
 from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
 
-Observation = dict[str, NDArray[np.float64]]
+Observation = dict[str, NDArray[np.float64]] | NDArray[np.float32]
 _ONLY = np.zeros(1, np.int64)  # the one row
 
 
@@ -86,10 +88,9 @@ class HydroneEnv(gym.Env[Any, Any]):
     the period in which `time_limit` is reached. The environment does this itself; the ids are registered without
     `max_episode_steps`.
 
-    `info` holds `outcome`, `time` (s), `energy` (J, of the rotors' shafts), `clearance` (least so far this episode, m;
-    infinite without obstacles), `transitions` (a dict for each crossing: `time` (s), `direction` "entry" or "exit",
-    `lateral_speed` (m/s), `tilt` (rad), `vertical_speed` (m/s); at most 8 a period), `reward_terms` and, at the end,
-    `is_success`.
+    `info` holds `outcome`, `time` (s), `energy` (J, rotor shafts), `clearance` (least so far, m; infinite without
+    obstacles), `transitions` (a dict a crossing: `time` (s), `direction` "entry" or "exit", `lateral_speed` (m/s),
+    `tilt` (rad), `vertical_speed` (m/s); at most 8 a period), `reward_terms` and, at the end, `is_success`.
 
     ## Arguments
     All by keyword, also through `gymnasium.make`:
@@ -103,7 +104,8 @@ class HydroneEnv(gym.Env[Any, Any]):
     - `vertical_mode` (True): hold still laterally inside the transition zone.
     - `rough_transition` ("fail"): "fail" ends an episode at a rough crossing, "count" only notes it.
     - `time_limit` (120.0): s.
-    - `interface` ("world"): the spaces above.
+    - `interface` ("world"): the spaces above; "egocentric": a flat (68,) observation and (3,) relative actions for
+      learners, documented in `hydrone_gym.envs.egocentric`.
     - `render_mode` (None): nothing is drawn yet.
 
     Raises TypeError for an unknown option and ValueError for a value out of range.
@@ -148,13 +150,14 @@ class HydroneEnv(gym.Env[Any, Any]):
             time_limit=time_limit,
             interface=interface,
         )
-        self._simulation = Simulation(self.options.vehicle, self.options.world, period, lanes=1)
-        self.action_space = action_space(self.world)
+        self.simulation = Simulation(self.options.vehicle, self.options.world, period, lanes=1)
+        references = action_space(self.world)
         space = observation_space(self.vehicle, self.world, self.options.num_obstacles)
-        self.observation_space = space
         self._sphere_space: Any = space["obstacles"]
-        self._lowest = self.action_space.low.astype(np.float64)
-        self._highest = self.action_space.high.astype(np.float64)
+        self._lowest, self._highest = references.low.astype(np.float64), references.high.astype(np.float64)
+        self._egocentric = EgocentricRows(self.options, 1) if interface == "egocentric" else None
+        self.action_space = references if self._egocentric is None else relative_action_space()
+        self.observation_space = space if self._egocentric is None else egocentric_space()
         self._law = self.options.law
         self._reference = np.zeros((1, 4))
         self._report = np.zeros((1, len(REPORT)))
@@ -164,19 +167,14 @@ class HydroneEnv(gym.Env[Any, Any]):
         self._transitions: list[dict[str, Any]] = []
 
     @property
-    def simulation(self) -> Simulation:
-        """The simulation that steps it: vehicle, world and period for planners."""
-        return self._simulation
-
-    @property
     def vehicle(self) -> Vehicle:
         """The vehicle."""
-        return self._simulation.vehicle
+        return self.simulation.vehicle
 
     @property
     def world(self) -> World:
         """Bounds, surface, sensing and what counts as arrival."""
-        return self._simulation.world
+        return self.simulation.world
 
     @property
     def scenario(self) -> Scenario:
@@ -215,6 +213,8 @@ class HydroneEnv(gym.Env[Any, Any]):
         begin_rows(*self._episodes, spheres.shape[1], 1, self._task, _ONLY, starts, goals, spheres, self._report)
         self._scenario = scenario
         self._transitions = []
+        if self._egocentric is not None:
+            self._egocentric.begin(self._episodes, _ONLY)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period with the reference moving to the action.
@@ -235,10 +235,15 @@ class HydroneEnv(gym.Env[Any, Any]):
         if now.rows["outcome"][0] != Outcome.RUNNING:
             ended = Outcome(int(now.rows["outcome"][0])).name
             raise ResetNeeded(f"step() was called after the episode ended with {ended}: call reset() first")
-        load_reference(action, self._lowest, self._highest, self._reference[0])
+        if self._egocentric is None:
+            load_reference(action, self._lowest, self._highest, self._reference[0])
+        else:
+            self._reference[:] = self._egocentric.references(np.asarray(action)[None], now)
         count = len(self._scenario.obstacles)
-        self._simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
+        self.simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
         settle(*now, count, 1, self._task, _ONLY, self._report)
+        if self._egocentric is not None:
+            self._egocentric.look(now)
         report = self._report[0].tolist()
         if report[-1] > 0.0:
             self._transitions += crossings_of(now.rows["crossing_log"][0], int(report[-1]))
@@ -251,6 +256,8 @@ class HydroneEnv(gym.Env[Any, Any]):
         return self._observation(), report[len(TERMS)], terminated, truncated, info
 
     def _observation(self) -> Observation:
+        if self._egocentric is not None:
+            return self._egocentric.observation()[0]
         rows = self._episodes.rows
         return {
             "state": rows["state"][0].copy(),
@@ -269,6 +276,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             transitions=tuple(dict(crossing) for crossing in self._transitions),
             random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
             seed=self._np_random_seed,
+            egocentric=copy.deepcopy(self._egocentric),
         )
 
     def set_state(self, snapshot: Snapshot) -> None:
@@ -281,6 +289,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         snapshot.check_options(self.options)
         self._episodes = copy_episodes(snapshot.episodes)
         self._scenario = snapshot.scenario
+        self._egocentric = copy.deepcopy(snapshot.egocentric)
         self._transitions = [dict(crossing) for crossing in snapshot.transitions]
         self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
         self._np_random_seed = snapshot.seed

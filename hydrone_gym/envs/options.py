@@ -11,7 +11,7 @@ from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw,
 from hydrone_gym.world.world import World
 
 MISSIONS = {"air_to_water": EXPERIMENT_1, "water_to_air": EXPERIMENT_2, "random": ScenarioLaw()}
-INTERFACES = ("world",)
+INTERFACES = ("world", "egocentric")
 
 
 @dataclass(frozen=True, kw_only=True)

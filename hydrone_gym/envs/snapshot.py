@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
+from hydrone_gym.envs.egocentric_rows import EgocentricRows
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import Episodes
 from hydrone_gym.world.scenario import Scenario
@@ -19,6 +20,7 @@ class Snapshot:
         transitions: the crossings so far.
         random_state: state of the bit generator that draws scenarios.
         seed: the seed it was made from.
+        egocentric: the memory of `interface="egocentric"`, else None.
     """
 
     options: Options
@@ -27,6 +29,7 @@ class Snapshot:
     transitions: tuple[dict[str, Any], ...]
     random_state: dict[str, Any]
     seed: int | None
+    egocentric: EgocentricRows | None
 
     def check_options(self, options: Options) -> None:
         """Raise ValueError naming every option in which another environment differs."""

@@ -12,6 +12,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.envs.batch import EpisodeBatch
+from hydrone_gym.envs.egocentric import egocentric_space, relative_action_space
+from hydrone_gym.envs.egocentric_rows import EgocentricRows
 from hydrone_gym.envs.info import batch_info, crossings_of, masked
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.requests import check_scenario, load_references, requested_rows
@@ -90,12 +92,15 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(autoreset_mode)}
         self._batch = EpisodeBatch(self.options, self.num_envs, _whole("threads", threads))
         world = self.options.world
-        self.single_action_space = action_space(world)
-        self.single_observation_space = observation_space(self.options.vehicle, world, self.options.num_obstacles)
+        references = action_space(world)
+        raw = observation_space(self.options.vehicle, world, self.options.num_obstacles)
+        self._sphere_space: Any = raw["obstacles"]
+        self._egocentric = EgocentricRows(self.options, self.num_envs) if interface == "egocentric" else None
+        self.single_action_space = references if self._egocentric is None else relative_action_space()
+        self.single_observation_space = raw if self._egocentric is None else egocentric_space()
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._low = self.single_action_space.low.astype(np.float64)
-        self._high = self.single_action_space.high.astype(np.float64)
+        self._low, self._high = references.low.astype(np.float64), references.high.astype(np.float64)
         self._generators: list[np.random.Generator] = []
         self._transitions = np.full(self.num_envs, None, dtype=object)
         self._ended = np.ones(self.num_envs, bool)
@@ -120,8 +125,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         rows, scenarios = requested_rows(options, self.num_envs)
         for scenario in scenarios:
             if scenario is not None:
-                bounds: Any = self.single_observation_space["obstacles"]  # type: ignore[index]
-                check_scenario(scenario, self.options.world, self.options.vehicle.radius, bounds)
+                check_scenario(scenario, self.options.world, self.options.vehicle.radius, self._sphere_space)
         self._seed(seed, rows)
         self._begin(rows, scenarios)
         info = batch_info(self._batch.report, self._transitions)
@@ -147,6 +151,8 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         for row in rows:
             self._transitions[row] = []
         self._ended[rows] = False
+        if self._egocentric is not None:
+            self._egocentric.begin(self._batch.episodes, rows)
 
     def step(
         self, actions: ArrayLike
@@ -165,12 +171,17 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         """
         if not self._generators:
             raise ResetNeeded("step() was called before reset(): call reset() first")
-        references = load_references(actions, self._low, self._high, self.num_envs)
+        if self._egocentric is None:
+            references = load_references(actions, self._low, self._high, self.num_envs)
+        else:
+            references = self._egocentric.references(actions, self._batch.episodes)
         mode = self.metadata["autoreset_mode"]
         again = np.flatnonzero(self._ended)
         if mode == AutoresetMode.DISABLED and len(again):
             raise ResetNeeded(f"step() was called with rows {again.tolist()} ended: reset them with a reset_mask first")
         self._batch.advance(references)
+        if self._egocentric is not None:
+            self._egocentric.look(self._batch.episodes)
         if len(again):
             self._begin(again, [None] * len(again))
         report = self._batch.report
@@ -202,7 +213,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         last = self._observation()
         final = np.full(self.num_envs, None, dtype=object)
         for row in rows:
-            final[row] = {key: value[row].copy() for key, value in last.items()}
+            final[row] = {k: v[row].copy() for k, v in last.items()} if isinstance(last, dict) else last[row].copy()
         final_info = masked({**info, "is_success": success, "_is_success": ended.copy()}, ended)
         self._begin(rows, [None] * len(rows))
         self._ended = np.zeros(self.num_envs, bool)
@@ -214,7 +225,9 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             "_final_info": ended.copy(),
         }
 
-    def _observation(self) -> dict[str, NDArray[np.float64]]:
+    def _observation(self) -> dict[str, NDArray[np.float64]] | NDArray[np.float32]:
+        if self._egocentric is not None:
+            return self._egocentric.observation()
         now = self._batch.episodes
         rows = now.rows
         return {

@@ -1,4 +1,4 @@
-"""Equations of motion in both media and the integrator that steps them (paper eqs. 1-8; E1-E10, E14, E15)."""
+"""Equations of motion in both media and the integrator that steps them (paper eqs. 1-4 and 9-12; E1-E10, E14, E15)."""
 
 from typing import NamedTuple
 
@@ -121,9 +121,7 @@ def _derivative(values, rotor_speed, vehicle, out):
     out[11] = a.yaw - medium.rotational_drag_z * abs(state.r) * state.r
 
 
-def state_derivative(
-    state: ArrayLike, rotor_speed: ArrayLike, vehicle: Vehicle | str = HYDRONE
-) -> NDArray[np.float64]:
+def state_derivative(state: ArrayLike, rotor_speed: ArrayLike, vehicle: Vehicle | str = HYDRONE) -> NDArray[np.float64]:
     """Time derivative of the state at constant rotor speeds: the open-loop model of one medium.
 
     Args:
@@ -134,7 +132,7 @@ def state_derivative(
         vehicle: a `Vehicle`, or "paper" or "physical".
 
     Returns:
-        (12,) derivative of `state` (paper eqs. 1-8 with the corrections of docs/deviations.md).
+        (12,) derivative of `state` (paper eqs. 1-4 and 9-12 with the corrections of docs/deviations.md).
 
     Raises:
         ValueError: wrong shape, a value that is not finite, or an unknown vehicle name.

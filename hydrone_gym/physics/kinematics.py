@@ -1,4 +1,4 @@
-"""State, rotation and Euler rates (paper eqs. 1, 3, 5, 7; deviation E3)."""
+"""State, rotation and Euler rates (paper eqs. 1, 3, 9, 11; deviation E3)."""
 
 from typing import NamedTuple
 

@@ -48,7 +48,7 @@ def _medium_params(vehicle: Vehicle, density: float, *, water: bool) -> MediumPa
     # The paper gives buoyancy and the restoring moment for water only; in air both are below 0.2 % of the weight.
     displaced = density * vehicle.volume if water else 0.0
     restoring = vehicle.buoyancy_offset * (vehicle.restoring_mass_share * vehicle.mass + displaced) * vehicle.gravity
-    return MediumParams(
+    values = (
         (vehicle.mass - displaced) * vehicle.gravity,
         1.0 / mass,
         *(1.0 / entry for entry in inertia),
@@ -60,6 +60,7 @@ def _medium_params(vehicle: Vehicle, density: float, *, water: bool) -> MediumPa
         -vehicle.rotor_limit_water if water else 0.0,
         vehicle.rotor_limit_water if water else vehicle.rotor_limit_air,
     )
+    return MediumParams._make(values)
 
 
 def vehicle_params(vehicle: Vehicle) -> VehicleParams:

@@ -1,4 +1,4 @@
-"""Rotor thrust, the wrench it makes in each medium, and shaft power (paper eqs. 2, 4, 6, 8; E4, E9)."""
+"""Rotor thrust, the wrench it makes in each medium, and shaft power (paper eqs. 2, 4, 10, 12; E4, E9)."""
 
 from typing import NamedTuple
 

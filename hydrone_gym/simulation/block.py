@@ -11,7 +11,7 @@ from hydrone_gym.control.reference import Integral
 from hydrone_gym.physics.kinematics import State
 
 LANES = 16
-LOGGED_CROSSINGS = 8  # a period keeps the details of this many crossings and counts the rest
+LOGGED_CROSSINGS = 8  # details kept until the driver sets `crossings` back to zero; further ones are only counted
 CROSSING_FIELDS = ("time", "direction", "lateral_speed", "tilt", "vertical_speed")
 
 _STATE = tuple(State._fields)
@@ -19,7 +19,7 @@ _INTEGRAL = tuple(f"integral_{name}" for name in Integral._fields)
 _SAVED = tuple(f"saved_{name}" for name in (*_STATE, *_INTEGRAL, "energy"))
 _REFERENCE = ("old_x", "old_y", "old_z", "old_psi", "move_x", "move_y", "move_z", "move_psi")
 _EPISODE = ("goal_x", "goal_y", "goal_z", "ticks", "energy", "clearance", "outcome", "crossings")
-_CROSSING = ("crossed", "cross_time", "cross_direction", "cross_speed2", "cross_cos", "cross_vz")
+_CROSSING = ("crossed", "cross_direction", "cross_speed2", "cross_cos", "cross_vz")
 
 ROW = np.dtype(
     [

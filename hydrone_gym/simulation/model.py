@@ -46,8 +46,9 @@ def unpack_model(values):
     air = MediumParams(*to_fixed_tuple(media, _MEDIUM))
     water = MediumParams(*to_fixed_tuple(media[_MEDIUM:], _MEDIUM))
     gains = media[2 * _MEDIUM :]
+    scalars = to_fixed_tuple(values, _SCALARS)
     return Model(
-        VehicleParams(*to_fixed_tuple(values, _SCALARS), air, water),
+        VehicleParams(*scalars, air, water),
         AirGainParams(*to_fixed_tuple(gains, _AIR_GAINS)),
         WaterGainParams(*to_fixed_tuple(gains[_AIR_GAINS:], _WATER_GAINS)),
         WorldParams(*to_fixed_tuple(gains[_AIR_GAINS + _WATER_GAINS :], _WORLD)),

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.world.placement import DRAW, NO_ENDS, NO_SPHERES, SIMPLE_ROUTE, place
 from hydrone_gym.world.scenario import Scenario, check_end
-from hydrone_gym.world.solvability import flight_space, has_grid_route, has_simple_route
+from hydrone_gym.world.solvability import flight_space, has_grid_route
 from hydrone_gym.world.world import World
 
 WALL_MARGIN = 1.0  # m from a random end to the walls
@@ -22,21 +22,6 @@ ZONE_MARGIN = 0.5  # m from a random end to the transition zone
 ATTEMPTS = 100  # scenarios drawn before a law is called unsolvable
 MOST_NUMBERS = 64  # one attempt gives up after this many times the usual count of uniform numbers
 MEDIA = ("air", "water")
-
-# What `_place` returns.
-_NO_ENDS, _NO_SPHERES, _NO_SIMPLE_ROUTE, _SIMPLE_ROUTE = range(4)
-
-_DRAW = np.dtype(
-    [
-        ("water_share", "f8", 2),  # probability of water, for start and goal
-        ("low", "f8", (2, 2, 3)),  # end, medium, axis: the boxes in which the ends are drawn; a fixed end is a point
-        ("high", "f8", (2, 2, 3)),
-        ("yaw", "f8"),  # half the range of the start's yaw
-        ("separation", "f8"),
-        ("clearance", "f8"),
-        ("radius", "f8", 2),
-    ]
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +105,7 @@ def prepare(law: ScenarioLaw, world: World, vehicle_radius: float) -> tuple[np.n
             f"ScenarioLaw.obstacle_radius must be less than {room / 2.0:g} m, half the shortest edge of the box, "
             f"got {law.obstacle_radius[1]!r} m"
         )
-    record = np.zeros(1, _DRAW)
+    record = np.zeros(1, DRAW)
     for end, name in enumerate(("start", "goal")):
         fixed = getattr(law, name)
         if fixed is not None:
@@ -173,77 +158,6 @@ def _check_separation(separation: float, record: np.void) -> None:
             )
 
 
-@inlined
-def _place_ends(law, numbers, start, goal):
-    """Draw both ends; returns how many of the uniform numbers were used, or 0 when there were too few."""
-    first = 1 if numbers[0] < law.water_share[0] else 0
-    second = 1 if numbers[1] < law.water_share[1] else 0
-    used = 2
-    while used + 7 <= numbers.size:
-        apart2 = 0.0
-        for axis in range(3):
-            low, high = law.low[0, first, axis], law.high[0, first, axis]
-            start[axis] = low + numbers[used + axis] * (high - low)
-            low, high = law.low[1, second, axis], law.high[1, second, axis]
-            goal[axis] = low + numbers[used + 3 + axis] * (high - low)
-            apart2 += (goal[axis] - start[axis]) ** 2
-        start[3] = law.yaw * (2.0 * numbers[used + 6] - 1.0)
-        used += 7
-        if apart2 >= law.separation * law.separation:
-            return used
-    return 0
-
-
-@inlined
-def _place_one(record, space, numbers, start, goal, obstacles):
-    """Draw ends and spheres from uniform numbers in [0, 1) and try the simple routes.
-
-    Shapes: record and space (1,) from `prepare`, numbers (K,); start (4,), goal (3,) and obstacles (M, 4) are written.
-    Returns _NO_ENDS or _NO_SPHERES when the numbers ran out, else whether there is a simple route.
-    """
-    law, box = record[0], space[0]
-    used = _place_ends(law, numbers, start, goal)
-    if used == 0:
-        return _NO_ENDS
-    x, y, z = box.lower[0], box.lower[1], box.lower[2]
-    dx, dy, dz = box.upper[0] - x, box.upper[1] - y, box.upper[2] - z
-    placed = 0
-    while placed < obstacles.shape[0]:
-        if used + 4 > numbers.size:
-            return _NO_SPHERES
-        cx, cy, cz = x + numbers[used] * dx, y + numbers[used + 1] * dy, z + numbers[used + 2] * dz
-        radius = law.radius[0] + numbers[used + 3] * (law.radius[1] - law.radius[0])
-        used += 4
-        reach2 = (radius + law.clearance) ** 2
-        to_start2 = (cx - start[0]) ** 2 + (cy - start[1]) ** 2 + (cz - start[2]) ** 2
-        to_goal2 = (cx - goal[0]) ** 2 + (cy - goal[1]) ** 2 + (cz - goal[2]) ** 2
-        if to_start2 >= reach2 and to_goal2 >= reach2:
-            obstacles[placed, 0], obstacles[placed, 1], obstacles[placed, 2] = cx, cy, cz
-            obstacles[placed, 3] = radius
-            placed += 1
-    return _SIMPLE_ROUTE if has_simple_route(space, start, goal, obstacles) else _NO_SIMPLE_ROUTE
-
-
-@kernel
-def _place(record, space, numbers, start, goal, obstacles):
-    """`_place_one` for Python."""
-    return _place_one(record, space, numbers, start, goal, obstacles)
-
-
-@kernel
-def place_many(record, space, numbers, chosen, starts, goals, obstacles):
-    """Place many scenarios at once: line i of `numbers` (k, K) for entry chosen[i] of the three outputs.
-
-    Returns (k,) bool, whether each has a simple route; the others go on with `draw` and the same numbers.
-    """
-    solved = np.zeros(chosen.size, np.bool_)
-    for i in range(chosen.size):
-        k = chosen[i]
-        status = _place_one(record, space, numbers[i], starts[k], goals[k], obstacles[k])
-        solved[i] = status == _SIMPLE_ROUTE
-    return solved
-
-
 def first_numbers(law: ScenarioLaw) -> int:
     """How many uniform numbers `draw` takes from a generator at a time."""
     return 30 + 5 * law.num_obstacles
@@ -268,14 +182,14 @@ def draw(
     usual = first_numbers(law)
     for attempt in range(ATTEMPTS):
         numbers = first if first is not None and attempt == 0 else rng.random(usual)
-        status = _place(record, space, numbers, start, goal, obstacles)
-        while status <= _NO_SPHERES:
+        status = place(record, space, numbers, start, goal, obstacles)
+        while status <= NO_SPHERES:
             if numbers.size >= MOST_NUMBERS * usual:
                 raise ValueError(_no_room(law, status))
             # The same beginning is placed again: no state has to survive between the blocks.
             numbers = np.concatenate((numbers, rng.random(numbers.size)))
-            status = _place(record, space, numbers, start, goal, obstacles)
-        if status == _SIMPLE_ROUTE or has_grid_route(space, start, goal, obstacles):
+            status = place(record, space, numbers, start, goal, obstacles)
+        if status == SIMPLE_ROUTE or has_grid_route(space, start, goal, obstacles):
             return
     raise ValueError(
         f"no solvable scenario after {ATTEMPTS} attempts: num_obstacles={law.num_obstacles}, "
@@ -285,7 +199,7 @@ def draw(
 
 def _no_room(law: ScenarioLaw, status: int) -> str:
     """Say what an attempt could not place."""
-    if status == _NO_ENDS:
+    if status == NO_ENDS:
         return f"no ends found that are {law.min_separation} m apart: lower ScenarioLaw.min_separation"
     return (
         f"no room for {law.num_obstacles} obstacles of radius {law.obstacle_radius} m that keep {law.end_clearance} m "

@@ -115,5 +115,3 @@ def cross(work, values, goal, source, size, sample_x, sample_y, objective, margi
         if kind == OPEN:
             return size
     return first
-
-

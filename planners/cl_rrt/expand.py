@@ -40,9 +40,7 @@ def draw_point(draws, k, root, goal, air, model):
     y_high = min(w.y_max - _WALL, max(root.state[1], goal[1]) + _AROUND) if near else w.y_max - _WALL
     x = between(draws[k + 3], x_low, x_high)
     y = between(draws[k + 4], y_low, y_high)
-    z = between(draws[k + 5], AIR_GATE, w.z_max - _WALL) if air else between(
-        draws[k + 5], w.z_min + _WALL, -WATER_GATE
-    )
+    z = between(draws[k + 5], AIR_GATE, w.z_max - _WALL) if air else between(draws[k + 5], w.z_min + _WALL, -WATER_GATE)
     return x, y, z
 
 
@@ -186,7 +184,8 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
         k = iteration * DRAWS
         kind, by_cost = draws[k], draws[k + 1] < 0.5 and not paper
         to_goal = kind < settings.goal_bias
-        column = not to_goal and change and (not paper or roam != 0) and kind < settings.goal_bias + settings.column_bias
+        column = not to_goal and (roam != 0 or (change and not paper))
+        column = column and kind < settings.goal_bias + settings.column_bias
         if to_goal:
             x, y, z = goal[0], goal[1], goal[2]
             from_air = z > 0.0

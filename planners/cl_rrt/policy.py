@@ -117,15 +117,13 @@ class CLRRT(PlannerPolicy):
 
     def _ahead(self, now: Known, sending: NDArray[np.float64]) -> Known:
         """Predict the end of this period under the reference sent now (Alg. 2, lines 4-8)."""
-        row = row_at(now.state, now.goal)
+        row: Any = row_at(now.state, now.goal)
         row["integral"], row["reference"] = now.integral, now.reference
-        sent = np.float32(sending).astype(np.float64)
+        sent = sending.astype(np.float32).astype(np.float64)
         self.simulation.advance(row, sent[None], np.zeros((1, 0)), np.zeros((1, 0)), 0)
         return now._replace(state=row["state"][0], integral=row["integral"][0], reference=sent)
 
-    def _decide(
-        self, start: Known, eye: NDArray[np.float64], memory: Memory
-    ) -> tuple[NDArray[np.float64], Memory]:
+    def _decide(self, start: Known, eye: NDArray[np.float64], memory: Memory) -> tuple[NDArray[np.float64], Memory]:
         """Plan from `start` with what was sensed from `eye`; return the reference for the period that begins there."""
         started = time.perf_counter()
         work = new_workspace(memory.nodes.copy(), start.obstacles, memory.backup.copy())
@@ -180,18 +178,14 @@ class CLRRT(PlannerPolicy):
         return size, first, stop, end
 
     @staticmethod
-    def _safety_action(
-        memory: Memory, size: int, edges: int, seconds: float
-    ) -> tuple[NDArray[np.float64], Memory]:
+    def _safety_action(memory: Memory, size: int, edges: int, seconds: float) -> tuple[NDArray[np.float64], Memory]:
         """Go on with the stop verified last; its final reference holds for good."""
         reference, backup, stop = memory.backup[0].copy(), memory.backup, memory.stop
         if stop > 1:
             backup, stop = np.roll(backup, -1, axis=0), stop - 1
         waiting = memory.waiting + 1
         report = Report(size, edges, 0, np.inf, False, seconds, waiting)
-        return reference, Memory(
-            memory.nodes, backup, stop, cycle=memory.cycle + 1, waiting=waiting, report=report
-        )
+        return reference, Memory(memory.nodes, backup, stop, cycle=memory.cycle + 1, waiting=waiting, report=report)
 
     def grow_tree(self, observation: Observation, iterations: int) -> TreeView:
         """Grow a tree from one observation without flying, as in the paper's Fig. 5.

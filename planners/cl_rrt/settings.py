@@ -67,4 +67,4 @@ class CLRRTSettings:
 
     def params(self, step: float) -> SettingParams:
         """Flatten for the kernels; `step` (m) is how far an edge in air may move its reference."""
-        return SettingParams(*(getattr(self, name) for name in SettingParams._fields[:-1]), step)
+        return SettingParams._make([*(getattr(self, name) for name in SettingParams._fields[:-1]), step])

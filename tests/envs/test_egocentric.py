@@ -182,6 +182,8 @@ def test_ray_to_the_goal_and_along_the_velocity():
     flat, _ = EGO.observe(observation)
     assert entry(flat, "ray_goal") == pytest.approx(2.0 / 4.0)
     assert entry(flat, "ray_velocity") == pytest.approx((3.0 - 0.75) / 4.0)
+    observation["state"][6:9] *= 1e-3  # drifting is not going anywhere
+    assert entry(EGO.observe(observation)[0], "ray_velocity") == 1.0
     observation["state"][6:9] = 0.0
     observation["goal"] = observation["state"][:3]
     flat, _ = EGO.observe(observation)
@@ -439,7 +441,9 @@ def test_parts_of_the_rows_are_left_alone():
 def test_every_caller_shares_one_compiled_version():
     batch, _ = random_raw(np.random.default_rng(0), 3)
     _, memory = EGO.observe({key: value.astype(np.float32) for key, value in batch.items()})
-    EGO.reference(np.zeros((3, 3), int), {key: np.asfortranarray(value) for key, value in batch.items()}, memory)
+    turned_storage = {key: np.asfortranarray(value) for key, value in batch.items()}
+    EGO.observe(turned_storage, Memory(*map(np.asfortranarray, memory)), [0, 1, 0])
+    EGO.reference(np.zeros((3, 3), int), turned_storage, memory)
     assert len(observe_rows.signatures) == len(place_references.signatures) == 1
 
 

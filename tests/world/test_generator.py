@@ -119,6 +119,7 @@ def test_radii_and_centres_are_uniform():
     share_under_water = np.mean(spheres[:, 2] < 0.0)
     assert share_under_water == pytest.approx(1 / 3, abs=0.02)
     assert np.abs(np.corrcoef(spheres.T) - np.eye(4)).max() < 0.03
+    assert np.abs(np.corrcoef(spheres[:-1].T, spheres[1:].T) - np.eye(8)).max() < 0.03, "one sphere follows the last"
 
 
 def test_media_are_fair_coins_or_as_the_law_says():
@@ -174,19 +175,33 @@ def test_start_and_goal_split_by_a_wall_of_spheres():
 
 def test_lateral_moves_inside_the_zone_do_not_count():
     """Two floors of spheres whose holes lie apart: only a way sideways through the zone joins them."""
+    start, goal = (0.0, 0.0, 8.0, 0.0), (0.0, 0.0, -4.4)
     grid = np.arange(-10.0, 10.1, 1.0)
-    floors = [
-        (x, y, z, 0.9)
-        for z, hole in ((-1.7, -6.0), (1.7, 6.0))
-        for x in grid
-        for y in grid
-        if math.hypot(x - hole, y - hole) > 2.5
-    ]
-    start, goal = (0.0, 0.0, 8.0, 0.0), (0.0, 0.0, -4.0)
-    assert not is_solvable(Scenario(start=start, goal=goal, obstacles=floors), WORLD, RADIUS)
-    aligned = [(x, y, -1.7 if z < 0 else z, r) for x, y, z, r in floors if z > 0]
-    aligned += [(x, y, -1.7, r) for x, y, _, r in aligned]
-    assert is_solvable(Scenario(start=start, goal=goal, obstacles=aligned), WORLD, RADIUS)
+
+    def floor(z, hole):
+        return [(x, y, z, 0.7) for x in grid for y in grid if math.hypot(x - hole, y - hole) > 2.5]
+
+    apart = Scenario(start=start, goal=goal, obstacles=floor(-2.2, -6.0) + floor(2.2, 6.0))
+    assert not is_solvable(apart, WORLD, RADIUS)
+    assert is_solvable(apart, World(zone=0.2), RADIUS)
+    above_each_other = dataclasses.replace(apart, obstacles=floor(-2.2, 6.0) + floor(2.2, 6.0))
+    assert is_solvable(above_each_other, WORLD, RADIUS)
+
+
+def test_small_spheres_at_the_surface_block_every_column():
+    grid = np.arange(-10.0, 10.1, 0.5)
+    lid = [(x, y, 0.0, 0.05) for x in grid for y in grid]
+    for law in (EXPERIMENT_1, EXPERIMENT_2):
+        assert not is_solvable(Scenario(start=(*law.start, 0.0), goal=law.goal, obstacles=lid), WORLD, RADIUS)
+
+
+def test_simple_routes_within_a_medium_stay_in_it():
+    """A curtain hangs down to the zone: no bend may duck through the zone, but a dive passes below."""
+    curtain = [(0.0, y, z, 0.5) for y in np.arange(-10.0, 10.1, 0.75) for z in np.arange(1.75, 10.1, 0.75)]
+    made = Scenario(start=(-8.0, 0.0, 1.4, 0.0), goal=(8.0, 0.0, 1.4), obstacles=curtain)
+    arrays = np.array(made.start), np.array(made.goal), np.array(made.obstacles)
+    assert not has_simple_route(flight_space(WORLD, RADIUS), *arrays)
+    assert is_solvable(made, WORLD, RADIUS)
 
 
 def slow_grid_route(scenario, world, radius):
