@@ -122,7 +122,7 @@ class Fly:
 
     def _announce_compiling(self) -> None:
         """Say why nothing seems to happen when the large kernels have not been compiled yet."""
-        kernels = (advance_rows, cycle) if self.policy == "clrrt" else (advance_rows,)
+        kernels: tuple[Any, ...] = (advance_rows, cycle) if self.policy == "clrrt" else (advance_rows,)
         folders = [kernel.stats.cache_path for kernel in kernels]
         if not all(folder and any(Path(folder).glob("*.nbi")) for folder in folders):
             print(_COMPILING, file=sys.stderr, flush=True)

@@ -15,7 +15,7 @@ _NEAREST = 0.05  # m: clearances are not taken smaller, so that the force stays 
 _WALL_INFLUENCE = 1.0  # m
 _WALL = 0.4  # m: references keep this far inside the box
 _ARRIVING = 1.0  # m: within this distance of the aim repulsion fades, or a goal near a sphere is never reached
-_SLOW = 1.6  # m: clearance ahead below which the vehicle slows down
+_SLOW = 2.0  # m: clearance ahead below which the vehicle slows down
 _SLOWEST = 0.25  # share of full speed
 _TURNING_LEAD = 0.6  # m: the reference under water is never nearer; within 0.4 m the law holds still
 _COLUMN_MARGIN = 0.35  # m: clearance of a crossing; a vehicle under water stops up to 0.4 m short of its reference
@@ -28,24 +28,25 @@ class PotentialField(PlannerPolicy):
 
     The attraction is the straight line's reference: to the gate over the goal, vertically through the surface, on to
     the goal. A sphere with clearance rho < rho_0 repels with gain (1/rho - 1/rho_0) / rho^2, a wall likewise. Where the
-    attraction points into a sphere, a force of at most the attraction's size along its surface is added (De Medio
-    and Oriolo, 1991),
-    and near the aim repulsion fades (Ge and Cui, 2000). A column blocked by a known sphere is pushed aside; a crossing
-    that has begun is finished. References stay within a period's travel of the vehicle. Its state is a tuple of None.
+    attraction points into a sphere, a force along its surface is added, at most of the attraction's size (De Medio and
+    Oriolo, 1991); near the aim repulsion fades (Ge and Cui, 2000). A column blocked by a known sphere is pushed aside;
+    a crossing that has begun is finished. References stay within a period's travel of the vehicle, nearer the closer
+    the spheres ahead. Its state is a tuple of None.
 
-    What it cannot do: leave a local minimum between several spheres, keep a clearance it promises (the field knows
-    nothing of the vehicle's inertia, nor of its turning under water), or cross to get round something.
+    What it cannot do: leave a local minimum between several spheres (it stays there until time is out), promise a
+    clearance (the field knows nothing of the vehicle's inertia, nor of its turning under water), or cross the surface
+    to get round something.
 
     Args:
         simulation: supplies speed limits, period and world.
         influence: distance rho_0 from which spheres repel, m.
-        gain: of the repulsion, in units of the attraction, m^3; 0.5 balances it at a clearance of 0.7 m.
+        gain: of the repulsion, in units of the attraction, m^3; 1 balances it at a clearance of 0.8 m.
 
     Raises:
         ValueError: an argument that is not positive.
     """
 
-    def __init__(self, simulation: Simulation, *, influence: float = 2.0, gain: float = 0.5) -> None:
+    def __init__(self, simulation: Simulation, *, influence: float = 2.0, gain: float = 1.0) -> None:
         """Check the field and read the limits."""
         for name, value, unit in (("influence", influence, "m"), ("gain", gain, "m^3")):
             if not 0.0 < value < math.inf:
@@ -60,7 +61,7 @@ class PotentialField(PlannerPolicy):
         self._gate = max(GATE, simulation.world.zone + 0.3)
 
     @classmethod
-    def for_env(cls, env: Any, *, influence: float = 2.0, gain: float = 0.5) -> Self:
+    def for_env(cls, env: Any, *, influence: float = 2.0, gain: float = 1.0) -> Self:
         """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
         return cls(simulation_of(env), influence=influence, gain=gain)
 

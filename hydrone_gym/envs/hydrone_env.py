@@ -27,7 +27,7 @@ from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
 
 Observation = dict[str, NDArray[np.float64]] | NDArray[np.float32]
-_ONLY = np.zeros(1, np.int64)  # the one row
+_ONLY = np.zeros(1, np.int64)
 
 
 class HydroneEnv(gym.Env[Any, Any]):
@@ -297,5 +297,4 @@ class HydroneEnv(gym.Env[Any, Any]):
 
 def known_options() -> tuple[str, ...]:
     """Names of the options every environment of this package takes."""
-    parameters = inspect.signature(HydroneEnv.__init__).parameters.values()
-    return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
+    return tuple(inspect.getfullargspec(HydroneEnv.__init__).kwonlyargs)

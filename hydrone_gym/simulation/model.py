@@ -48,7 +48,7 @@ def unpack_model(values):
     gains = media[2 * _MEDIUM :]
     scalars = to_fixed_tuple(values, _SCALARS)
     return Model(
-        VehicleParams(*scalars, air, water),
+        VehicleParams(*scalars, air, water),  # type: ignore[call-arg]  # the checker cannot count a compiled tuple
         AirGainParams(*to_fixed_tuple(gains, _AIR_GAINS)),
         WaterGainParams(*to_fixed_tuple(gains[_AIR_GAINS:], _WATER_GAINS)),
         WorldParams(*to_fixed_tuple(gains[_AIR_GAINS + _WATER_GAINS :], _WORLD)),

@@ -366,7 +366,12 @@ def test_reference_stays_inside_the_box():
     memory = Memory(np.array([9.5, -9.5, -4.5]), 1.0, 0.0)
     place = EGO.reference([-1.0, -1.0, -1.0], observation, memory)
     np.testing.assert_allclose(place[:3], [9.8, -9.8, -4.8], atol=1e-6)
-    np.testing.assert_array_equal(EGO.reference([-9.0, -9.0, -9.0], observation, memory), place)
+
+
+def test_action_is_clipped_to_its_space():
+    observation = raw([0.0, 0.0, 4.0], (8.0, 0.0, 4.0))
+    _, memory = EGO.observe(observation)
+    np.testing.assert_array_equal(EGO.reference([1.5, -9.0, 1e30], observation, memory)[:3], [2.0, -2.0, 5.5])
 
 
 def test_yaw_reference_is_kept_in_air_and_is_the_heading_in_water():

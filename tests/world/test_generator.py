@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 from scipy import ndimage, sparse
 from scipy.stats import kstest
 
-from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw, _place, draw, generate, prepare
+from hydrone_gym.world.generator import (
+    EXPERIMENT_1,
+    EXPERIMENT_2,
+    ScenarioLaw,
+    draw,
+    first_numbers,
+    generate,
+    prepare,
+)
+from hydrone_gym.world.placement import place, place_many
 from hydrone_gym.world.scenario import Scenario, validate
 from hydrone_gym.world.solvability import flight_space, has_grid_route, has_simple_route, is_solvable
 from hydrone_gym.world.world import World
@@ -102,11 +111,28 @@ def test_drawing_into_rows_equals_generating():
         assert np.array_equal(obstacles[seed], expected.obstacles)
 
 
+def test_placing_many_at_once_equals_generating_one_by_one():
+    """The crowded law leaves some without a simple route: those go on alone, from the numbers already drawn."""
+    law, count = dataclasses.replace(EXPERIMENT_1, **DENSE), 40
+    starts, goals, obstacles = np.empty((count, 4)), np.empty((count, 3)), np.empty((count, law.num_obstacles, 4))
+    prepared = prepare(law, WORLD, RADIUS)
+    streams = [np.random.default_rng(seed) for seed in range(count)]
+    numbers = np.stack([stream.random(first_numbers(law)) for stream in streams])
+    solved = place_many(*prepared, numbers, np.arange(count), starts, goals, obstacles)
+    assert 0 < solved.sum() < count
+    for seed in np.flatnonzero(~solved):
+        draw(law, prepared, streams[seed], starts[seed], goals[seed], obstacles[seed], numbers[seed])
+    for seed in range(count):
+        expected = from_seed(seed, law)
+        assert (tuple(starts[seed]), tuple(goals[seed])) == (expected.start, expected.goal)
+        assert np.array_equal(obstacles[seed], expected.obstacles)
+
+
 def test_kernels_have_one_compiled_version():
     rng = np.random.default_rng(0)
     for _ in range(50):
         is_solvable(generate(dataclasses.replace(EXPERIMENT_1, **DENSE), WORLD, RADIUS, rng), WORLD, RADIUS)
-    for one in (_place, has_simple_route, has_grid_route):
+    for one in (place, has_simple_route, has_grid_route):
         assert len(one.signatures) == 1
 
 
