@@ -51,7 +51,7 @@ class HydroneVecEnv(VecEnv):
         """Begin an episode in every row; seeds given by `seed` are used once."""
         seeds: Any = None if all(seed is None for seed in self._seeds) else self._seeds
         options = next((option for option in self._options if option), None)
-        observation, info = self.env.reset(seed=seeds, options=options)
+        observation, _ = self.env.reset(seed=seeds, options=options)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._returns[:] = 0.0
         self._lengths[:] = 0

@@ -33,6 +33,7 @@ from planners.straight_line import StraightLine
 PLANNERS: dict[str, type] = {
     planner.__name__: planner for planner in (StraightLine, PotentialField, OpenLoopRRT, PublishedCLRRT, MPPI, CLRRT)
 }
+RADII = {20: (0.5, 1.5), 40: (0.8, 1.8)}  # m: least and greatest, for so many spheres
 MISSIONS = {"exp1": "HydroneGym/AirToWater-v0", "exp2": "HydroneGym/WaterToAir-v0"}
 
 
@@ -46,7 +47,7 @@ class Settings:
         planners: which planners.
         missions: which missions.
         spheres: numbers of spheres.
-        radius: least and greatest radius of a sphere, m.
+        radius: least and greatest radius of a sphere in m; None for 0.5 to 1.5 with 20 spheres and 0.8 to 1.8 with 40.
         vehicle: parameter set, "paper" or "physical".
         n_jobs: worlds flown at once; 1 measures decision times best.
         backend: of joblib, "loky", "threading" or any registered one.
@@ -58,7 +59,7 @@ class Settings:
     planners: tuple[str, ...] = tuple(PLANNERS)
     missions: tuple[str, ...] = tuple(MISSIONS)
     spheres: tuple[int, ...] = (20, 40)
-    radius: tuple[float, float] = (0.8, 1.8)
+    radius: tuple[float, float] | None = None
     vehicle: str = "paper"
     n_jobs: int = 1
     backend: str = "loky"
@@ -149,6 +150,9 @@ def main(settings: Settings) -> None:
             raise SystemExit(f"--missions must be among {', '.join(MISSIONS)}, got {name!r}")
     if settings.worlds < 1:
         raise SystemExit(f"--worlds must be at least 1, got {settings.worlds}")
+    for spheres in settings.spheres:
+        if settings.radius is None and spheres not in RADII:
+            raise SystemExit(f"--radius is needed for {spheres} spheres; without it they must be 20 or 40")
     seeds = range(settings.first_seed, settings.first_seed + settings.worlds)
     sets = list(itertools.product(settings.missions, settings.spheres, settings.planners))
     pool = joblib.Parallel(n_jobs=settings.n_jobs, backend=settings.backend, return_as="generator")
@@ -157,7 +161,7 @@ def main(settings: Settings) -> None:
         writer = csv.DictWriter(file, [field.name for field in fields(Record)])
         writer.writeheader()
         for mission, spheres, planner in sets:
-            spec = (planner, mission, spheres, settings.radius, settings.vehicle)
+            spec = (planner, mission, spheres, settings.radius or RADII[spheres], settings.vehicle)
             jobs = pool(joblib.delayed(fly_one)(*spec, seed) for seed in seeds)
             results = list(tqdm(jobs, total=len(seeds), desc=f"{planner} {mission} {spheres}", leave=False))
             writer.writerows(asdict(record) for record, _ in results)

@@ -16,7 +16,7 @@ _GOAL_BIAS = 0.2
 _COLUMN_BIAS = 0.3  # share of samples that are crossings, while the mission must change medium
 _COLUMN_SPREAD = 2.5  # m, standard deviation of crossings around the end that lies in water
 _LONGEST = 4.0  # m an edge
-_WALL = 0.5  # m: samples keep this far from the walls
+_WALL = 0.8  # m: samples keep this far from the walls
 _CRUISE = 0.8  # share of the limit speeds at which the reference moves
 _AT_GATE = (0.45, 0.15)  # m and m/s: how near and how slow before the reference crosses
 

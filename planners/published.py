@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
 from planners.cl_rrt.execute import cycle
@@ -126,11 +126,11 @@ class PublishedCLRRT(PlannerPolicy):
             node, before = nodes[i], row["crossings"][0]
             self._simulation.advance(row, node["reference"][None].copy(), spheres, closest, len(now.obstacles))
             vertical = node["kind"] == CROSSING or nodes["kind"][node["parent"]] == CROSSING
-            ended = row["outcome"][0] not in (Outcome.RUNNING, Outcome.GOAL)
+            ended = row["outcome"][0] not in (RUNNING, GOAL)
             if ended or (row["crossings"][0] > before and not vertical):
                 return int(i)
             node["state"], node["integral"] = row["state"][0], row["integral"][0]
-            if row["outcome"][0] == Outcome.GOAL:
+            if row["outcome"][0] == GOAL:
                 break
         return -1
 

@@ -177,3 +177,12 @@ def test_the_installed_command(tmp_path):
     )
     assert failed.returncode == 2
     assert "Traceback" not in failed.stderr
+
+
+def test_a_reader_that_leaves_early_gets_no_traceback(tmp_path):
+    program = "import sys; from hydrone_gym.cli import main; sys.exit(main())"
+    arguments = [sys.executable, "-c", program, *EMPTY, "--json", "--out", str(tmp_path)]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert "Traceback" not in process.stderr.read()
+        assert process.wait(timeout=120) == 1

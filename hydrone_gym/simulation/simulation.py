@@ -74,7 +74,8 @@ def trajectory(
     Returns:
         Times (N,) in s, states (N, 12), the moving references (N, 4), and the final row. Ends early with the outcome.
     """
-    spheres = np.zeros((0, 4)) if obstacles is None else np.ascontiguousarray(obstacles, dtype=np.float64)
+    # a copy, since a read-only array would compile another version of the kernel
+    spheres = np.zeros((0, 4)) if obstacles is None else np.array(obstacles, dtype=np.float64)
     closest = np.full((1, len(spheres)), np.inf)
     flat = spheres.reshape(1, -1)
     row = row.copy()

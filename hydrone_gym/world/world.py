@@ -57,6 +57,7 @@ class World:
             corner = getattr(self, name)
             if len(corner) != 3 or not all(math.isfinite(value) for value in corner):
                 raise ValueError(f"World.{name} must be three finite numbers (m), got {corner!r}")
+            object.__setattr__(self, name, tuple(float(value) for value in corner))  # hashable, whatever was given
         for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
             if low >= high:
                 raise ValueError(f"World.upper must exceed World.lower along {axis} (m), got {low!r} to {high!r}")

@@ -18,6 +18,7 @@ _GOAL_EXTENSION = 60  # edges: a try at the goal may go all the way
 _AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
 _AROUND_SHARE = 0.7
 _ROAM_HEIGHT = 1.5  # m
+_OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it bounds from below what a path may cost
 _WALL = 0.5  # m: samples keep this far from the walls
 _AIR_REACHED = 0.4  # m
 _WATER_REACHED = 0.5  # m: more than the hold radius
@@ -179,7 +180,7 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
     for i in range(work.path.size):
         work.path[i] = -1
     paper = objective.paper > 0.0
-    best = np.inf if paper else least_cost(work, size)
+    best = least_cost(work, size) if settings.prune > 0.0 else np.inf
     for iteration in range(iterations):
         k = iteration * DRAWS
         kind, by_cost = draws[k], draws[k + 1] < 0.5 and not paper
@@ -206,13 +207,14 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
             n = work.nodes[i]
             n.tried = 1 if to_goal else n.tried
             # a sample that cannot beat the best path, even in an empty world, is not worth an edge
-            if n.cost + cost_to_go(n.state[0], n.state[1], n.state[2], x, y, z, objective) + beyond >= best:
+            via = cost_to_go(n.state[0], n.state[1], n.state[2], x, y, z, objective) + beyond
+            if n.cost + _OPTIMISM * via >= best:
                 continue
             limit = _GOAL_EXTENSION if to_goal else settings.extension
             grown = extend(work, values, goal, i, size, x, y, z, limit, settings, objective, margin, ticks)
             if grown > size:
                 size = grown
-                if work.nodes[size - 1].goal and not paper:
+                if work.nodes[size - 1].goal and settings.prune > 0.0:
                     best = min(best, work.nodes[size - 1].cost)
                 break
     return size

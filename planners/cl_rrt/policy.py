@@ -81,7 +81,7 @@ class CLRRT(PlannerPolicy):
         self.settings = CLRRTSettings() if settings is None else settings
         self._objective = objective_params(simulation, objective)
         self.cruise_speed = safe_speed(simulation, 2 if latency else 1)
-        self._params = self.settings.params(self.cruise_speed * simulation.period)
+        self._params = self.settings.params(self.cruise_speed * simulation.period, prune=objective != "paper")
 
     @classmethod
     def for_env(
@@ -197,8 +197,9 @@ class CLRRT(PlannerPolicy):
         start = known(observation)
         memory = first_memory(self.settings.max_nodes, start.reference)
         work = new_workspace(memory.nodes, start.obstacles, memory.backup)
-        grower = CLRRT(self.simulation, iterations=iterations, seed=self.seed, settings=self.settings)
-        size = grower._run(work, start, start.state[:3], memory, 0.0)[0]
+        whole = CLRRT(self.simulation, iterations=iterations, seed=self.seed, settings=self.settings)
+        whole._params = whole._params._replace(prune=0.0)  # a picture of the tree wants its other branches too
+        size = whole._run(work, start, start.state[:3], memory, 0.0)[0]
         nodes = work.nodes[:size]
         edges = np.stack([nodes["reference"][nodes["parent"][1:], :3], nodes["reference"][1:, :3]], axis=1)
         ends = np.flatnonzero((nodes["goal"] == 1) & (nodes["dead"] == 0))

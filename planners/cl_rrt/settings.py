@@ -18,6 +18,7 @@ class SettingParams(NamedTuple):
     extension: int
     look_ahead: int
     step: float  # m an edge in air may move its reference: the safe speed times the period
+    prune: float  # 1: samples that cannot beat the best path are dropped
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +66,11 @@ class CLRRTSettings:
             if not isinstance(value, int) or value < least:
                 raise ValueError(f"CLRRTSettings.{name} must be a whole number of at least {least}, got {value!r}")
 
-    def params(self, step: float) -> SettingParams:
-        """Flatten for the kernels; `step` (m) is how far an edge in air may move its reference."""
-        return SettingParams._make([*(getattr(self, name) for name in SettingParams._fields[:-1]), step])
+    def params(self, step: float, *, prune: bool = True) -> SettingParams:
+        """Flatten for the kernels.
+
+        Args:
+            step: how far an edge in air may move its reference, m.
+            prune: whether samples that cannot beat the best path are dropped.
+        """
+        return SettingParams._make([*(getattr(self, name) for name in SettingParams._fields[:-2]), step, float(prune)])

@@ -65,7 +65,7 @@ def test_wrappers_of_stable_baselines():
     observation = rows.reset()
     rng, ended = np.random.default_rng(0), 0
     for _ in range(60):
-        observation, rewards, done, infos = rows.step(random_actions(rng, 8))
+        observation, rewards, _, infos = rows.step(random_actions(rng, 8))
         assert np.isfinite(observation).all()
         assert np.isfinite(rewards).all()
         ended += sum("episode" in info for info in infos)

@@ -1,5 +1,7 @@
 """The native vector environment: every row is the single environment, in Gymnasium's conventions."""
 
+import itertools
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -142,7 +144,7 @@ def test_returned_arrays_are_new():
     actions = first["reference"].astype(np.float32)
     held = [rows.step(actions) for _ in range(3)]
     arrays = [[*step[0].values(), *step[1:4], step[4]["clearance"], step[4]["outcome"]] for step in held]
-    for earlier, later in zip(arrays, arrays[1:]):
+    for earlier, later in itertools.pairwise(arrays):
         for a, b in zip(earlier, later, strict=True):
             assert not np.shares_memory(a, b)
     assert all(array in rows.observation_space[key] for key, array in held[-1][0].items())
