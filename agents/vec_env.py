@@ -52,7 +52,7 @@ class HydroneVecEnv(VecEnv):
         seeds: Any = None if all(seed is None for seed in self._seeds) else self._seeds
         options = next((option for option in self._options if option), None)
         observation, _ = self.env.reset(seed=seeds, options=options)
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self._returns[:] = 0.0
         self._lengths[:] = 0
         self._reset_seeds()

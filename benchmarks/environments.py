@@ -1,7 +1,8 @@
 """Environments as contestants: what is measured is `step`, resets and the drawing of actions included.
 
-Two ways of driving: "near" sends references within 1.5 m of the vehicle, so that episodes last as they do under a
-policy; "uniform" sends references anywhere in the action space, which ends many episodes early by a rough crossing.
+Two ways of driving: "near" sends references within 1.5 m of the vehicle, a random walk that ends at a wall or an
+obstacle; "uniform" sends references anywhere in the action space, between which the vehicle hovers about. Episodes last
+as long as under a policy or longer, so beginning one is a small share of the work; tables say how many there were.
 Every row counts as one environment step a call, except where that call only began its next episode.
 """
 

@@ -55,7 +55,7 @@ class Settings:
     """
 
     worlds: int = 200
-    first_seed: int = 1000
+    first_seed: int = 2000
     planners: tuple[str, ...] = tuple(PLANNERS)
     missions: tuple[str, ...] = tuple(MISSIONS)
     spheres: tuple[int, ...] = (20, 40)

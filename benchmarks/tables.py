@@ -46,7 +46,11 @@ def environments(measured: dict[str, Any]) -> Sheet:
     for name, entry in measured.items():
         ends = entry.get("outcomes", {})
         total = sum(ends.values())
-        shares = ", ".join(f"{word.lower()} {100 * n / total:.0f} %" for word, n in sorted(ends.items()) if n)
+        shares = ", ".join(
+            f"{word.lower().replace('_', ' ')} {100 * n / total:.0f} %"
+            for word, n in sorted(ends.items())
+            if n >= total / 200
+        )
         spread = "–" if entry["spread"] != entry["spread"] else f"± {100 * entry['spread']:.0f} %"
         length = number(entry["mean_length"]) if total else "–"
         rows.append((name, number(entry["rate"]), spread, length, shares or "–"))
@@ -118,6 +122,24 @@ def versions(measured: dict[str, Any]) -> Sheet:
     return Sheet("Compiled versions of all kernels so far", ("rows", "versions"), rows)
 
 
+def c_reference(measured: dict[str, Any]) -> Sheet:
+    loads = list(measured["nanoseconds"])
+    names = list(measured["nanoseconds"][loads[0]])
+    words = {"1": "scalar", "16": "16 lanes"}
+    rows = []
+    for name in names:
+        program, lanes = name.split(", ")
+        times = (f"{measured['nanoseconds'][load][name]:.1f}" for load in loads)
+        rows.append((f"{program}, {words[lanes]}", *times))
+    ratios = "; ".join(f"{name}: {ratio:.2f}" for name, ratio in measured["ratios"].items())
+    notes = [
+        f"Ratios with both media: {ratios}.",
+        f"Largest difference between the results of C and Numba: {max(measured['difference'].values()):.3g}. "
+        f"C flags: {measured['flags']}. The fast-math rows give other results and are for information.",
+    ]
+    return Sheet("CPU nanoseconds a substep", ("", *loads), rows, notes)
+
+
 BUILDERS: dict[str, Callable[[dict[str, Any]], Sheet]] = {
     "environments": environments,
     "edges": edges,
@@ -126,4 +148,5 @@ BUILDERS: dict[str, Callable[[dict[str, Any]], Sheet]] = {
     "memory": memory,
     "start": start,
     "versions": versions,
+    "c_reference": c_reference,
 }

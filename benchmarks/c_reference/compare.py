@@ -16,8 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.table import Table
 
+from benchmarks import tables
 from benchmarks.c_reference.build import FAST, FLAGS, CReference, compiler
 from benchmarks.flying import OBSTACLES, flying_rows, lane_major, near_references, simulation, spheres_out_of_the_way
 from benchmarks.timing import Contestant, in_turns, save
@@ -121,21 +121,6 @@ def measure(settings: Settings, folder: Path) -> dict[str, Any]:
     return {"difference": differences, "flags": " ".join(FLAGS), "nanoseconds": times, "ratios": ratios}
 
 
-def show(measured: dict[str, Any], console: Console) -> None:
-    """Print the table."""
-    names = list(measured["nanoseconds"]["both media"])
-    table = Table(title="CPU nanoseconds a substep", caption=f"{ROWS} rows; C: {measured['flags']}")
-    table.add_column("load")
-    for name in names:
-        table.add_column(name, justify="right")
-    for label, row in measured["nanoseconds"].items():
-        table.add_row(label, *(f"{row[name]:.1f}" for name in names))
-    console.print(table)
-    for name, ratio in measured["ratios"].items():
-        console.print(f"{name}: {ratio:.2f}")
-    console.print(f"largest difference between C and Numba: {max(measured['difference'].values()):.3g}")
-
-
 def main() -> int:
     settings = tyro.cli(Settings, description=__doc__)
     if compiler() is None:
@@ -143,11 +128,11 @@ def main() -> int:
         return 1
     with tempfile.TemporaryDirectory() as folder:
         measured = measure(settings, Path(folder))
-    save("c_reference", "python -m benchmarks.c_reference.compare", measured)
+    save("c_reference", "python -m benchmarks.c_reference.compare", {"measured": measured})
     if settings.json:
         print(json.dumps(measured))
     else:
-        show(measured, Console())
+        Console().print(tables.c_reference(measured))
     return 0
 
 

@@ -27,7 +27,7 @@ OPTIONS = [
     ({"vertical_mode": 1}, "vertical_mode must be True or False, got 1"),
     ({"rough_transition": "ignore"}, "rough_transition must be one of 'fail', 'count', got 'ignore'"),
     ({"time_limit": math.nan}, "time_limit must be a positive number (s), got nan"),
-    ({"interface": "egocentric"}, "interface must be one of 'world', got 'egocentric'"),
+    ({"interface": "flat"}, "interface must be one of 'world', 'egocentric', got 'flat'"),
     ({"mission": "up"}, "mission must be one of 'air_to_water', 'water_to_air', 'random', got 'up'"),
     ({"render_mode": "human"}, "render_mode must be None, got 'human'"),
 ]

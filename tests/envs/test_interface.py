@@ -38,6 +38,16 @@ def test_sb3_check_env(name, vehicle):
         check_env_sb3(env)
 
 
+@pytest.mark.parametrize("vehicle", VEHICLES)
+@pytest.mark.parametrize("name", IDS)
+def test_egocentric_interface_passes_both_checkers_without_a_warning(name, vehicle):
+    env = gym.make(name, vehicle=vehicle, interface="egocentric").unwrapped
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env)
+        check_env_sb3(env)
+
+
 def test_no_obstacles_at_all():
     env = make(num_obstacles=0)
     with warnings.catch_warnings():

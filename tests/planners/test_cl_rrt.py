@@ -14,6 +14,7 @@ from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, generate
 from hydrone_gym.world.world import World
 from planners import CLRRT, CLRRTSettings
+from planners.cl_rrt.stopping import stop_distances
 from tests.planners.flights import fly, make
 
 MISSIONS = ("AirToWater", "WaterToAir", "Mission")
@@ -76,7 +77,7 @@ def test_whole_path_is_execution():
 
 
 def test_same_seed_same_references():
-    env = make("Mission")
+    env = make("AirToWater", num_obstacles=40)  # an easy world has one best path, whatever is drawn
     first, _ = fly(env, CLRRT.for_env(env, seed=7), seed=1)
     again, _ = fly(env, CLRRT.for_env(env, seed=7), seed=1)
     other, _ = fly(env, CLRRT.for_env(env, seed=8), seed=1)
@@ -161,6 +162,64 @@ def test_hard_worlds_end_without_contact(name):
     assert info["outcome"] is (Outcome.GOAL if solvable else Outcome.TIMEOUT)
 
 
+@pytest.mark.parametrize("objective", ["energy", "length", "paper"])
+def test_other_objectives_arrive_too(objective):
+    env = make("AirToWater")
+    planner = CLRRT.for_env(env, objective=objective)
+    for seed in range(4):
+        history, info = fly(env, planner, seed=seed)
+        assert info["outcome"] is Outcome.GOAL
+        assert info["clearance"] > 0.0
+    assert history[-1].memory.report.arrives
+
+
+def test_energy_objective_counts_what_the_environment_counts():
+    """The cost of the path sent is the energy that flying it takes: known map, one plan."""
+    env = make("AirToWater", num_obstacles=0)
+    planner = CLRRT.for_env(env, objective="energy")
+    observation, _ = env.reset(seed=0)
+    _, (memory,) = planner.predict(observation)
+    assert memory.report.arrives
+    state, done = None, False
+    while not done:
+        action, state = planner.predict(observation, state)
+        observation, _, done, _, info = env.step(action)
+    assert info["energy"] <= memory.report.cost * (1.0 + 1e-12)  # later cycles may only find something cheaper
+
+
+@pytest.mark.parametrize("mission", ["AirToWater", "WaterToAir"])
+def test_latency(mission):
+    """Each reference was decided a period before it is sent, from what was sensed then, and that is still safe."""
+    env = make(mission)
+    planner = CLRRT.for_env(env, latency=True)
+    assert planner.cruise_speed < CLRRT.for_env(env).cruise_speed
+    for seed in range(6):
+        history, info = fly(env, planner, seed=seed)
+        assert info["outcome"] is Outcome.GOAL
+        assert info["clearance"] > 0.0
+        for before, after in zip(history, history[1:]):
+            np.testing.assert_array_equal(before.memory.pending.astype(np.float32), after.action)
+
+
+def test_cruise_speed_follows_from_the_sensor():
+    """A period of travel and the measured stop fit into what is sensed; a shorter sensor means slower flight."""
+    speeds = [CLRRT(Simulation(HYDRONE, World(sensor_range=r))).cruise_speed for r in (1.5, 2.0, 3.0)]
+    assert speeds[0] < speeds[1] < speeds[2] == pytest.approx(0.95 * HYDRONE.air_gains.speed_limit)
+    stop = stop_distances(Simulation(HYDRONE, World()), np.array([speeds[1]]), air=True)[0]
+    assert 0.5 * speeds[1] + stop <= 2.0 - HYDRONE.radius
+
+
+def test_report():
+    env = make("AirToWater")
+    history, _ = fly(env, CLRRT.for_env(env), seed=0)
+    for cycle in history:
+        report = cycle.memory.report
+        assert report.nodes >= report.depth
+        assert (report.depth == 0) == (report.waiting > 0)
+        assert report.seconds > 0.0
+    assert history[0].memory.report.edges > 20
+
+
 def test_time_budget_is_kept():
     env = make("AirToWater")
     planner = CLRRT.for_env(env, time_budget=0.02)
@@ -228,6 +287,8 @@ def test_view_of_a_tree():
         ({"iterations": 2.5}, "iterations must be a whole number of at least 1, got 2.5"),
         ({"time_budget": -1.0}, r"time_budget must be positive \(s\), got -1.0"),
         ({"time_budget": float("nan")}, r"time_budget must be positive \(s\), got nan"),
+        ({"objective": "speed"}, "objective must be one of 'time', 'energy', 'length', 'paper', got 'speed'"),
+        ({"latency": 1}, "latency must be True or False, got 1"),
         ({"seed": -3}, "seed must be a whole number that is not negative, got -3"),
     ],
 )

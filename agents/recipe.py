@@ -1,0 +1,73 @@
+"""Recipes: hyper-parameters as documented data, one YAML file an algorithm in the format of rl-baselines3-zoo."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from stable_baselines3.common.utils import LinearSchedule
+
+FOLDER = Path(__file__).parent / "hyperparameters"
+ENV_ID = "HydroneGym/Mission-v0"
+LINEAR = "lin_"  # prefix of a value that falls linearly to zero over the training
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """How to train.
+
+    Attributes:
+        algorithm: name of the file, "ppo".
+        steps: transitions to learn from.
+        missions: rows an environment id, in order.
+        policy: name of the policy class of Stable-Baselines3.
+        settings: the other arguments of the algorithm, as written in the file.
+    """
+
+    algorithm: str
+    steps: int
+    missions: dict[str, int]
+    policy: str
+    settings: dict[str, Any]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return sum(self.missions.values())
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the settings as the algorithm takes them: schedules made of their names."""
+        return {name: _scheduled(value) for name, value in self.settings.items()}
+
+
+def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
+    """Read the recipe of an algorithm, from the package or from a file of the user.
+
+    Raises ValueError for an unknown algorithm, or for a file that is no recipe, naming it and what is wrong.
+    """
+    known = sorted(file.stem for file in FOLDER.glob("*.yml"))
+    if algorithm not in known:
+        raise ValueError(f"algorithm must be one of {', '.join(map(repr, known))}, got {algorithm!r}")
+    file = FOLDER / f"{algorithm}.yml" if path is None else path
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise ValueError(f"{file}: no YAML: {error}") from None
+    if not isinstance(content, dict) or not isinstance(content.get(ENV_ID), dict):
+        raise ValueError(f"{file}: needs an entry {ENV_ID!r} with the hyper-parameters")
+    settings = dict(content[ENV_ID])
+    missing = [name for name in ("n_envs", "n_timesteps", "policy") if name not in settings]
+    if missing:
+        raise ValueError(f"{file}: {ENV_ID} lacks {', '.join(missing)}")
+    count, steps, policy = settings.pop("n_envs"), settings.pop("n_timesteps"), settings.pop("policy")
+    missions = content.get("missions", {ENV_ID: count})
+    if not isinstance(missions, dict) or sum(missions.values()) != count:
+        raise ValueError(f"{file}: the rows of missions must sum to n_envs = {count}, got {missions!r}")
+    return Recipe(algorithm=algorithm, steps=int(steps), missions=missions, policy=policy, settings=settings)
+
+
+def _scheduled(value: Any) -> Any:
+    """Turn "lin_5e-4" into a schedule; anything else stays as it is."""
+    if isinstance(value, str) and value.startswith(LINEAR):
+        return LinearSchedule(float(value.removeprefix(LINEAR)), 0.0, 1.0)
+    return value
