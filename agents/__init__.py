@@ -1,5 +1,9 @@
 """Policies that learn: everything here may use torch and Stable-Baselines3, and nothing below it may.
 
 Install with the extra ``agents``: ``pip install "hydrone-gym[agents]"``. Agents may learn from planners, never the
-other way.
+other way. Flying a trained agent, `load_agent`, needs neither torch nor Stable-Baselines3.
 """
+
+from agents.agent import Agent, load_agent, shipped_agents
+
+__all__ = ["Agent", "load_agent", "shipped_agents"]

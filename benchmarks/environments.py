@@ -42,7 +42,7 @@ def has_vector_env() -> bool:
 def has_egocentric() -> bool:
     """Whether the learner's interface exists."""
     try:
-        gym.make(ID, interface="egocentric").close()
+        make_vector(1, "egocentric").close()
     except ValueError:
         return False
     return True
@@ -69,7 +69,7 @@ def single(driving: str, name: str, interface: str = "world") -> tuple[Contestan
     env = gym.make(ID, interface=interface)
     space: Any = env.action_space
     rng = np.random.default_rng(0)
-    drawn = rng.uniform(space.low, space.high, (DRAWN, 4)).astype(np.float32)
+    drawn = rng.uniform(space.low, space.high, (DRAWN, *space.shape)).astype(np.float32)
     offsets = rng.uniform(-REACH, REACH, (DRAWN, 3)).astype(np.float32)
     observation: Any = env.reset(seed=0)[0]
     flights = Flights()
@@ -102,7 +102,7 @@ def vector(
     env = make_vector(count, interface, threads)
     space: Any = env.single_action_space
     rng = np.random.default_rng(0)
-    drawn = rng.uniform(space.low, space.high, (DRAWN, count, 4)).astype(np.float32)
+    drawn = rng.uniform(space.low, space.high, (DRAWN, count, *space.shape)).astype(np.float32)
     offsets = rng.uniform(-REACH, REACH, (DRAWN, count, 3)).astype(np.float32)
     observation: Any = env.reset(seed=0)[0]
     flights = Flights()

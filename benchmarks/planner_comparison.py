@@ -8,10 +8,10 @@ With a backend of several processes decision times include what the processes co
 """
 
 import csv
-import functools
 import itertools
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import joblib
@@ -25,12 +25,11 @@ from hydrone_gym.simulation.outcome import Outcome
 from planners.cl_rrt.policy import CLRRT
 from planners.mppi import MPPI
 from planners.open_loop_rrt import OpenLoopRRT
-from planners.policy import PlannerPolicy
 from planners.potential_field import PotentialField
 from planners.published import PublishedCLRRT
 from planners.straight_line import StraightLine
 
-PLANNERS: dict[str, type] = {
+PLANNERS: dict[str, Any] = {
     planner.__name__: planner for planner in (StraightLine, PotentialField, OpenLoopRRT, PublishedCLRRT, MPPI, CLRRT)
 }
 RADII = {20: (0.5, 1.5), 40: (0.8, 1.8)}  # m: least and greatest, for so many spheres
@@ -83,23 +82,17 @@ class Record:
     decision_p99: float
 
 
-@functools.lru_cache(maxsize=64)
-def prepared(
-    planner: str, mission: str, spheres: int, radius: tuple[float, float], vehicle: str
-) -> tuple[gym.Env, PlannerPolicy]:
-    """Make an environment and a planner, compiled: one decision is made and thrown away."""
-    env = gym.make(MISSIONS[mission], num_obstacles=spheres, obstacle_radius=radius, vehicle=vehicle)
-    policy = PLANNERS[planner].for_env(env)
-    observation, _ = env.reset(seed=0)
-    policy.predict(observation)
-    return env, policy
-
-
 def fly_one(
     planner: str, mission: str, spheres: int, radius: tuple[float, float], vehicle: str, seed: int
 ) -> tuple[Record, np.ndarray]:
-    """Fly one world; return its record and the decision times (K,) in ms."""
-    env, policy = prepared(planner, mission, spheres, radius, vehicle)
+    """Fly one world; return its record and the decision times (K,) in ms.
+
+    Environment and planner are new, so that threads share nothing; a first decision, thrown away, loads the kernels.
+    """
+    env = gym.make(MISSIONS[mission], num_obstacles=spheres, obstacle_radius=radius, vehicle=vehicle)
+    policy = PLANNERS[planner].for_env(env)
+    observation, _ = env.reset(seed=seed)
+    policy.predict(observation)
     flight = fly(env, policy, seed=seed)
     p50, p99 = percentiles(flight.decision_ms, (50.0, 99.0))
     record = Record(

@@ -103,16 +103,20 @@ def compiled_versions() -> dict[str, int]:
 
 
 def versions(*counts: int) -> dict[str, Any]:
-    """Compiled versions after each number of rows: the first may compile, the others must not."""
+    """Compiled versions after each number of rows: no kernel may get a second one."""
     from benchmarks.environments import make_vector
 
-    totals = []
-    for count in counts or (1, 7, 64, 1000, 4096):
+    sizes = counts or (1, 7, 64, 1000, 4096)
+    kernels, most = [], []
+    for count in sizes:
         env = make_vector(count)
         env.reset(seed=0)
-        env.step(env.action_space.sample())
-        totals.append(sum(compiled_versions().values()))
-    return {"num_envs": list(counts or (1, 7, 64, 1000, 4096)), "versions": totals, "kernels": compiled_versions()}
+        for _ in range(3):
+            env.step(env.action_space.sample())
+        found = compiled_versions()
+        kernels.append(len(found))
+        most.append(max(found.values()))
+    return {"num_envs": list(sizes), "kernels": kernels, "most": most, "versions": compiled_versions()}
 
 
 PROBES: dict[str, Callable[..., dict[str, Any]]] = {

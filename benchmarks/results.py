@@ -22,8 +22,8 @@ ORDER = ("environments", "peers", "c_reference", "edges", "threads", "neighbour"
 HEAD = """# Measured speed
 
 Written by `python -m benchmarks.results` from `benchmarks/results/*.json`; each table names the command that measures
-it again. Rates are per CPU second on one core unless a table says otherwise, medians of turns taken alternately, after a
-warm-up, so that compared figures come from the same minute of the same machine. One environment step is 0.5 s of
+it again. Rates are per CPU second on one core unless a table says otherwise, medians of turns taken alternately, after
+a warm-up, so that compared figures come from the same minute of the same machine. One environment step is 0.5 s of
 flight: 50 substeps of control and dynamics, collision and sensing every 50 ms against 20 spheres, observation, reward.
 """
 
@@ -52,7 +52,7 @@ def describe(record: dict[str, Any]) -> str:
 
 def write_page(records: dict[str, dict[str, Any]], path: Path) -> None:
     """One section a measurement."""
-    parts = [HEAD, "![Control steps a CPU second](../docs/images/throughput.png)\n"]
+    parts = [HEAD, "![Physics substeps a CPU second](../docs/images/throughput.png)\n"]
     for name, record in records.items():
         parts.append(sheet_of(name, record["measured"]).markdown())
         parts.append(f"`{record['command']}`  \n{describe(record)}\n")

@@ -1,6 +1,7 @@
 """CL-RRT: what it promises, measured on flights through the environment."""
 
 import dataclasses
+import itertools
 import pickle
 import time
 
@@ -83,6 +84,17 @@ def test_same_seed_same_references():
     other, _ = fly(env, CLRRT.for_env(env, seed=8), seed=1)
     np.testing.assert_array_equal([c.action for c in first], [c.action for c in again])
     assert not np.array_equal([c.action for c in first], [c.action for c in other])
+
+
+def test_a_hundred_plans_repeat():
+    env = make("WaterToAir", num_obstacles=40)
+    planner, twin = CLRRT.for_env(env), CLRRT.for_env(env)
+    for seed in range(100):
+        observation, _ = env.reset(seed=seed)
+        first, (memory,) = planner.predict(observation)
+        again, (other,) = twin.predict(observation)
+        np.testing.assert_array_equal(first, again)
+        np.testing.assert_array_equal(memory.nodes[: memory.size], other.nodes[: other.size])
 
 
 def test_predict_never_changes_its_state():
@@ -197,7 +209,7 @@ def test_latency(mission):
         history, info = fly(env, planner, seed=seed)
         assert info["outcome"] is Outcome.GOAL
         assert info["clearance"] > 0.0
-        for before, after in zip(history, history[1:]):
+        for before, after in itertools.pairwise(history):
             np.testing.assert_array_equal(before.memory.pending.astype(np.float32), after.action)
 
 

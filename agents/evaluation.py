@@ -1,0 +1,96 @@
+"""How often a policy arrives: many held-out worlds flown at once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+import hydrone_gym  # noqa: F401  (registers the ids)
+from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.statistics import wilson_interval
+from hydrone_gym.simulation.outcome import Outcome
+
+MISSIONS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
+HELD_OUT = 10_000_000  # seeds from here on are for evaluation; training uses those below
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """How the flights of one mission ended.
+
+    Attributes:
+        mission: environment id.
+        episodes: number of flights, each in a world of its own.
+        outcomes: flights an outcome, those that occurred.
+        success: share that arrived.
+        interval: 95 % Wilson interval of that share.
+        time: mean time of those that arrived, s; None if none did.
+        energy: mean energy of those that arrived, J; None if none did.
+    """
+
+    mission: str
+    episodes: int
+    outcomes: dict[str, int]
+    success: float
+    interval: tuple[float, float]
+    time: float | None
+    energy: float | None
+
+
+def evaluate(
+    policy: Policy,
+    mission: str,
+    *,
+    episodes: int = 1000,
+    seed: int = HELD_OUT,
+    options: Mapping[str, Any] | None = None,
+) -> Score:
+    """Fly a policy once in each of many worlds, deterministically.
+
+    Args:
+        policy: on the raw interface, for batches.
+        mission: environment id.
+        episodes: number of worlds; world i is the one a single environment draws from ``seed + i``.
+        seed: of the first world.
+        options: keyword options of the environment.
+    """
+    rows = gym.make_vec(mission, num_envs=episodes, vectorization_mode="vector_entry_point", **(options or {}))
+    observation, info = rows.reset(seed=seed)
+    starts, memory = np.ones(episodes, bool), None
+    outcome = np.zeros(episodes, np.int64)
+    time, energy = np.zeros(episodes), np.zeros(episodes)
+    while not outcome.all():
+        actions, memory = policy.predict(observation, state=memory, episode_start=starts, deterministic=True)
+        observation, _, terminated, truncated, info = rows.step(actions)
+        starts = terminated | truncated
+        first = (outcome == 0) & starts  # rows fly on after their first episode; what they do then does not count
+        outcome[first] = info["outcome"][first]
+        time[first], energy[first] = info["time"][first], info["energy"][first]
+    rows.close()
+    arrived = outcome == Outcome.GOAL
+    count = int(arrived.sum())
+    return Score(
+        mission=mission,
+        episodes=episodes,
+        outcomes={kind.name: int((outcome == kind).sum()) for kind in Outcome if (outcome == kind).any()},
+        success=count / episodes,
+        interval=wilson_interval(count, episodes),
+        time=float(time[arrived].mean()) if count else None,
+        energy=float(energy[arrived].mean()) if count else None,
+    )
+
+
+def score_table(scores: Sequence[Score]) -> str:
+    """Return scores as a Markdown table."""
+    lines = ["| mission | worlds | success % | 95 % interval | time (s) | failures |", "|---|---|---|---|---|---|"]
+    for score in scores:
+        low, high = (100.0 * end for end in score.interval)
+        failures = ", ".join(f"{name} {n}" for name, n in score.outcomes.items() if name != "GOAL") or "none"
+        time = "-" if score.time is None else f"{score.time:.1f}"
+        lines.append(
+            f"| {score.mission} | {score.episodes} | {100.0 * score.success:.2f} | {low:.2f}–{high:.2f} | {time} | "
+            f"{failures} |"
+        )
+    return "\n".join(lines)

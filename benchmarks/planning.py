@@ -1,0 +1,200 @@
+"""CL-RRT over sets of random worlds: success, safety, crossings, time, path, energy and planning time a cycle.
+
+    python -m benchmarks.planning                       # six mission types, 20 and 40 spheres, 1,000 worlds each
+    python -m benchmarks.planning --worlds 200 --sets experiment-1 experiment-2 --density 20
+
+World k of a set is drawn from seed k. Every flight goes through the registered environment. Worlds whose flight does
+not end at the goal are saved as scenario files beside the results, named after set, density, seed and outcome.
+"""
+
+import dataclasses
+import json
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+import tyro
+from joblib import Parallel, delayed
+from scipy.stats import binomtest
+
+from hydrone_gym import Outcome, save_scenario
+from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw, generate
+from hydrone_gym.world.world import World
+from planners import CLRRT
+
+SETS = {
+    "experiment-1": EXPERIMENT_1,
+    "experiment-2": EXPERIMENT_2,
+    "air-air": ScenarioLaw(media=("air", "air")),
+    "water-water": ScenarioLaw(media=("water", "water")),
+    "air-water": ScenarioLaw(media=("air", "water")),
+    "water-air": ScenarioLaw(media=("water", "air")),
+}
+DENSITIES = {20: (0.5, 1.5), 40: (0.8, 1.8)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """What to fly."""
+
+    worlds: int = 1000
+    """Worlds a set."""
+    sets: tuple[str, ...] = tuple(SETS)
+    """Mission types."""
+    density: tuple[int, ...] = tuple(DENSITIES)
+    """Numbers of spheres: 20 of 0.5-1.5 m, or 40 of 0.8-1.8 m radius."""
+    vehicle: Literal["paper", "physical"] = "paper"
+    """Parameter set."""
+    objective: Literal["time", "energy", "length", "paper"] = "time"
+    """What the planner minimises."""
+    iterations: int = 60
+    """Samples a cycle."""
+    latency: bool = False
+    """Use each plan one period after it was begun."""
+    jobs: int = 1
+    """Worlds flown at once; more than one disturbs the planning times."""
+    out: Path = Path("benchmarks/results/planning.json")
+    """Where the figures go; failed worlds go beside it."""
+
+
+class Flown(NamedTuple):
+    """One flight."""
+
+    seed: int
+    outcome: str
+    time: float
+    energy: float
+    length: float
+    clearance: float
+    lateral: float
+    tilt: float
+    crossing: float
+    in_water: float
+    cycles: tuple[float, ...]  # s
+    edges: int
+
+
+def law_of(name: str, density: int) -> ScenarioLaw:
+    """The law of a set at a density."""
+    return dataclasses.replace(SETS[name], num_obstacles=density, obstacle_radius=DENSITIES[density])
+
+
+def fly_some(name: str, density: int, seeds: range, a: Arguments) -> list[Flown]:
+    """Fly the worlds of some seeds."""
+    vehicle = named_vehicle(a.vehicle)
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=density, vehicle=a.vehicle, disable_env_checker=True)
+    planner = CLRRT.for_env(env, iterations=a.iterations, objective=a.objective, latency=a.latency)
+    law, flown = law_of(name, density), []
+    observation, _ = env.reset(seed=0)
+    planner.predict(observation)  # compiled, or loaded from the cache, before anything is timed
+    for seed in seeds:
+        scenario = generate(law, World(), vehicle.radius, np.random.default_rng(seed))
+        observation, _ = env.reset(options={"scenario": scenario})
+        state, done, length, wet, cycles, edges = None, False, 0.0, 0, [], 0
+        while not done:
+            before = observation["state"][:3]
+            began = time.perf_counter()
+            action, state = planner.predict(observation, state)
+            cycles.append(time.perf_counter() - began)
+            edges += state[0].report.edges
+            observation, _, terminated, truncated, info = env.step(action)
+            length += float(np.linalg.norm(observation["state"][:3] - before))
+            wet += observation["state"][2] < 0.0
+            done = terminated or truncated
+        crossings = info["transitions"]
+        flown.append(
+            Flown(
+                seed,
+                info["outcome"].name,
+                info["time"],
+                info["energy"],
+                length,
+                info["clearance"],
+                max((c["lateral_speed"] for c in crossings), default=0.0),
+                float(np.degrees(max((c["tilt"] for c in crossings), default=0.0))),
+                crossings[0]["time"] if crossings else float("nan"),
+                wet * 0.5 / info["time"],
+                tuple(cycles),
+                edges,
+            )
+        )
+        if info["outcome"] is not Outcome.GOAL:
+            folder = a.out.parent / "failed"
+            folder.mkdir(parents=True, exist_ok=True)
+            stem = f"{a.vehicle}-{a.objective}-{name}-{density}-{seed}-{info['outcome'].name.lower()}"
+            save_scenario(scenario, folder / f"{stem}.json")
+    return flown
+
+
+def summary(flown: list[Flown]) -> dict[str, Any]:
+    """Figures of a set."""
+    outcomes = [f.outcome for f in flown]
+    reached = [f for f in flown if f.outcome == "GOAL"]
+    interval = binomtest(len(reached), len(flown)).proportion_ci(method="wilson")
+    cycles = 1e3 * np.concatenate([f.cycles for f in flown])
+    return {
+        "worlds": len(flown),
+        "goal": len(reached),
+        "success_low": interval.low,
+        "success_high": interval.high,
+        "failures": {f"{f.seed}": f.outcome for f in flown if f.outcome != "GOAL"},
+        "collisions": outcomes.count("COLLISION"),
+        "rough": outcomes.count("ROUGH_TRANSITION"),
+        "time_s": float(np.median([f.time for f in reached])),
+        "length_m": float(np.median([f.length for f in reached])),
+        "energy_J": float(np.median([f.energy for f in reached])),
+        "crossing_s": float(np.nanmedian([f.crossing for f in reached])) if reached[0].crossing > 0 else None,
+        "water_share": float(np.mean([f.in_water for f in reached])),
+        "lateral_max": max(f.lateral for f in flown),
+        "tilt_max": max(f.tilt for f in flown),
+        "clearance_min": min(f.clearance for f in flown),
+        "cycle_p50_ms": float(np.percentile(cycles, 50)),
+        "cycle_p99_ms": float(np.percentile(cycles, 99)),
+        "cycle_max_ms": float(cycles.max()),
+        "edges_a_cycle": sum(f.edges for f in flown) / len(cycles),
+        "edges_a_second": sum(f.edges for f in flown) / (cycles.sum() / 1e3),
+    }
+
+
+def table(results: dict[str, dict[str, Any]]) -> str:
+    """A Markdown table of all sets."""
+    lines = [
+        "| set | goal | collisions | rough | time s | path m | energy J | crosses at s "
+        "| lateral max m/s | tilt max deg | cycle p50 / p99 ms |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, r in results.items():
+        crossing = "-" if r["crossing_s"] is None else f"{r['crossing_s']:.1f}"
+        lines.append(
+            f"| {name} | {r['goal']}/{r['worlds']} | {r['collisions']} | {r['rough']} | {r['time_s']:.1f} "
+            f"| {r['length_m']:.1f} | {r['energy_J']:.0f} | {crossing} | {r['lateral_max']:.3f} | {r['tilt_max']:.2f} "
+            f"| {r['cycle_p50_ms']:.2f} / {r['cycle_p99_ms']:.1f} |"
+        )
+    return "\n".join(lines)
+
+
+def main(a: Arguments) -> None:
+    """Fly all sets, print the table and save the figures."""
+    results = {}
+    for density in a.density:
+        for name in a.sets:
+            parts = np.array_split(np.arange(a.worlds), a.jobs)
+            jobs = (delayed(fly_some)(name, density, [int(k) for k in part], a) for part in parts)
+            flown = [flight for part in Parallel(n_jobs=a.jobs)(jobs) for flight in part]
+            results[f"{name}, {density} spheres"] = summary(flown)
+            print(table(dict([list(results.items())[-1]])).splitlines()[-1], flush=True)
+    a.out.parent.mkdir(parents=True, exist_ok=True)
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
+    arguments = {key: str(value) for key, value in dataclasses.asdict(a).items()}
+    document = {"arguments": arguments, "commit": commit.stdout.strip(), "results": results}
+    a.out.write_text(json.dumps(document, indent=1, default=float) + "\n")
+    print("\n" + table(results))
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Arguments))
