@@ -1,0 +1,175 @@
+"""Training: a recipe, a seed and a folder in; an agent, its curve and what it was made with out.
+
+A run folder holds `config.yaml` and `versions.json`, `curve.csv` and `curve.png`, `checkpoints/`, the finished `agent/`
+for `agents.load_agent`, and `evaluation.json` with its success on held-out worlds.
+"""
+
+import dataclasses
+import json
+import platform
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from agents.activation import Tanh
+from agents.agent import load_agent
+from agents.agent_file import save_agent
+from agents.checkpoint import MODEL, checkpoints, load_checkpoint
+from agents.evaluation import HELD_OUT, MISSIONS, Score, evaluate
+from agents.export import export_agent
+from agents.mission_mix import MissionMix
+from agents.recipe import ENV_ID, Recipe, load_recipe
+from agents.run_log import CHECKPOINTS, RunLog, draw_curve
+
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO}
+CONFIG = "config.yaml"
+PACKAGES = ("hydrone-gym", "stable_baselines3", "torch", "gymnasium", "numpy", "numba")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingRun:
+    """What is trained, where, and from what.
+
+    Attributes:
+        folder: run folder, made by `train`; must not hold a run already.
+        algorithm: name of a recipe of the package.
+        seed: of everything random; one seed and one thread give the same weights again.
+        steps: transitions, the recipe's number unless given.
+        recipe: path of a YAML file to use instead of the package's.
+        options: keyword options of the environments, `num_obstacles` and so on.
+        start_from: run folder whose latest weights to begin with, None for new ones.
+        threads: of torch; with one, results repeat bit for bit.
+        checkpoint_every: least number of steps between checkpoints.
+        evaluation_episodes: held-out worlds a mission at the end, 0 for none.
+        progress: show a bar on stderr.
+
+    Raises:
+        ValueError: an option out of range.
+    """
+
+    folder: Path
+    algorithm: str = "ppo"
+    seed: int = 0
+    steps: int | None = None
+    recipe: Path | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+    start_from: Path | None = None
+    threads: int = 1
+    checkpoint_every: int = 500_000
+    evaluation_episodes: int = 1000
+    progress: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not 0 <= self.seed < HELD_OUT // 2:
+            raise ValueError(f"seed must lie between 0 and {HELD_OUT // 2 - 1}, got {self.seed}")
+        for name, least in (("threads", 1), ("checkpoint_every", 1), ("evaluation_episodes", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if self.steps is not None and self.steps < 1:
+            raise ValueError(f"steps must be at least 1, got {self.steps}")
+
+    def loaded_recipe(self) -> Recipe:
+        """Return the recipe with this run's number of steps."""
+        recipe = load_recipe(self.algorithm, self.recipe)
+        return recipe if self.steps is None else dataclasses.replace(recipe, steps=self.steps)
+
+
+def train(run: TrainingRun) -> list[Score]:
+    """Train from the beginning and return the scores on held-out worlds.
+
+    Raises:
+        FileExistsError: the folder holds a run already; go on with it by `resume`.
+        ValueError, TypeError: a recipe or option that is refused.
+    """
+    recipe = run.loaded_recipe()
+    if (run.folder / CONFIG).exists():
+        raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
+    torch.set_num_threads(run.threads)
+    rows = MissionMix(recipe.missions, run.options)
+    model = ALGORITHMS[run.algorithm](recipe.policy, rows, **_arguments(recipe), seed=run.seed, device="cpu")
+    if run.start_from is not None:
+        model.set_parameters(_latest(run.start_from) / MODEL, device="cpu")
+    run.folder.mkdir(parents=True, exist_ok=True)
+    _write_config(run, recipe)
+    return _learn(run, recipe, model, (0.0, 0.0))
+
+
+def resume(folder: Path, *, progress: bool = True) -> list[Score]:
+    """Go on with a run from its latest checkpoint, as if it had not stopped, and return its scores.
+
+    Raises:
+        FileNotFoundError: no run, or one without a checkpoint.
+    """
+    if not (folder / CONFIG).is_file():
+        raise FileNotFoundError(f"no training run at {folder}: {folder / CONFIG} does not exist")
+    content = yaml.safe_load((folder / CONFIG).read_text(encoding="utf-8"))
+    recipe = Recipe(**content["recipe"])
+    paths = {name: content["run"][name] and Path(content["run"][name]) for name in ("recipe", "start_from")}
+    run = TrainingRun(**{**content["run"], **paths, "folder": folder, "progress": progress})
+    torch.set_num_threads(run.threads)
+    model, extra = load_checkpoint(_latest(folder), ALGORITHMS[run.algorithm])
+    return _learn(run, recipe, model, extra["spent"])
+
+
+def _arguments(recipe: Recipe) -> dict[str, Any]:
+    """Complete the recipe's settings: the fast tanh where it says nothing else, and a longer memory of successes."""
+    arguments = recipe.arguments()
+    policy = {"activation_fn": Tanh, **arguments.get("policy_kwargs", {})}
+    return {"stats_window_size": 1000, **arguments, "policy_kwargs": policy}
+
+
+def _latest(folder: Path) -> Path:
+    saved = checkpoints(folder / CHECKPOINTS)
+    if not saved:
+        raise FileNotFoundError(f"{folder} holds no checkpoint")
+    return saved[-1]
+
+
+def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[float, float]) -> list[Score]:
+    """Train to the end, then write the curve's figure, the agent and its evaluation."""
+    log = RunLog(run.folder, recipe.steps, every=run.checkpoint_every, progress=run.progress, spent=spent)
+    left = recipe.steps - model.num_timesteps
+    if left > 0:
+        model.learn(left, callback=log, reset_num_timesteps=model.num_timesteps == 0)
+    draw_curve(run.folder)
+    notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions()}
+    save_agent(export_agent(model, run.folder.name, ENV_ID, notes), run.folder / "agent")
+    scores = evaluate_missions(run)
+    text = json.dumps([dataclasses.asdict(score) for score in scores], indent=1)
+    (run.folder / "evaluation.json").write_text(text + "\n", encoding="utf-8")
+    return scores
+
+
+def evaluate_missions(run: TrainingRun) -> list[Score]:
+    """Fly a run's finished agent on held-out worlds of every mission."""
+    if run.evaluation_episodes == 0:
+        return []
+    policy = load_agent(run.folder / "agent")
+    return [evaluate(policy, id_, episodes=run.evaluation_episodes, options=run.options) for id_ in MISSIONS]
+
+
+def _write_config(run: TrainingRun, recipe: Recipe) -> None:
+    """Write what the run was started with."""
+    described = dataclasses.asdict(run)
+    described = {name: str(value) if isinstance(value, Path) else value for name, value in described.items()}
+    content = {"run": described, "recipe": dataclasses.asdict(recipe)}
+    (run.folder / CONFIG).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    (run.folder / "versions.json").write_text(json.dumps(versions(), indent=1) + "\n", encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of everything that results depend on."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found

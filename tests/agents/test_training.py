@@ -1,0 +1,188 @@
+"""Training runs: what they leave behind, that they repeat, and that stopping and resuming loses nothing."""
+
+import csv
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from agents import training
+from agents.activation import Tanh
+from agents.agent_file import read_agent
+from agents.checkpoint import checkpoints
+from agents.evaluation import HELD_OUT, MISSIONS
+from agents.mission_mix import MissionMix
+from agents.recipe import ENV_ID, load_recipe
+from agents.run_log import RunLog
+from agents.training import TrainingRun, resume, train
+
+SMALL = {
+    ENV_ID: {
+        "n_envs": 48,
+        "n_timesteps": 48 * 8 * 6,
+        "policy": "MlpPolicy",
+        "n_steps": 8,
+        "batch_size": 128,
+        "n_epochs": 2,
+        "learning_rate": "lin_5e-4",
+        "policy_kwargs": {"net_arch": [16], "log_std_init": -1.0},
+    },
+    "missions": {ENV_ID: 32, "HydroneGym/AirToWater-v0": 16},
+}
+PERIOD = 48 * 8  # steps an update
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "small.yml"
+    path.write_text(yaml.safe_dump(SMALL))
+    return path
+
+
+def small_run(folder, recipe, **changes):
+    settings = {"checkpoint_every": PERIOD, "evaluation_episodes": 0, "progress": False, "seed": 5, **changes}
+    return TrainingRun(folder=folder, recipe=recipe, **settings)
+
+
+def layers(folder):
+    network = read_agent(folder / "agent").network
+    return [*network.weights, *network.biases]
+
+
+def curve(folder):
+    with (folder / "curve.csv").open() as stream:
+        return [{k: v for k, v in line.items() if not k.endswith("_s")} for line in csv.DictReader(stream)]
+
+
+def test_a_run_folder_is_complete(tmp_path, recipe):
+    folder = tmp_path / "run"
+    scores = train(small_run(folder, recipe, evaluation_episodes=8))
+    assert [score.mission for score in scores] == list(MISSIONS)
+    assert [entry["episodes"] for entry in json.loads((folder / "evaluation.json").read_text())] == [8, 8, 8]
+    assert (folder / "curve.png").stat().st_size > 1000
+    assert [int(line["steps"]) for line in curve(folder)] == [PERIOD * k for k in range(1, 7)]
+    assert json.loads((folder / "versions.json").read_text())["torch"].startswith(torch.__version__.split("+")[0])
+    assert read_agent(folder / "agent").notes["steps"] == 6 * PERIOD
+    assert len(checkpoints(folder / "checkpoints")) == 2
+    with pytest.raises(FileExistsError, match="holds a run already"):
+        train(small_run(folder, recipe))
+
+
+def test_killed_and_resumed_is_never_stopped(tmp_path, recipe, monkeypatch):
+    """A run killed in the middle of a rollout goes on from its checkpoint to the very same weights and curve."""
+    train(small_run(tmp_path / "whole", recipe))
+
+    class KilledError(Exception):
+        pass
+
+    def dies(self, step=RunLog._on_step):
+        if self.num_timesteps > 3.5 * PERIOD:
+            raise KilledError
+        return step(self)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(RunLog, "_on_step", dies)
+        with pytest.raises(KilledError):
+            train(small_run(tmp_path / "halves", recipe))
+    torch.manual_seed(99)
+    np.random.seed(99)  # noqa: NPY002
+    resume(tmp_path / "halves", progress=False)
+    for a, b in zip(layers(tmp_path / "whole"), layers(tmp_path / "halves"), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert curve(tmp_path / "whole") == curve(tmp_path / "halves")
+
+
+def test_seeds(tmp_path, recipe):
+    for name, seed in (("a", 5), ("b", 5), ("c", 6)):
+        train(small_run(tmp_path / name, recipe, seed=seed))
+    for a, b in zip(layers(tmp_path / "a"), layers(tmp_path / "b"), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(layers(tmp_path / "a")[0], layers(tmp_path / "c")[0])
+
+
+def test_start_from_takes_the_weights(tmp_path, recipe, monkeypatch):
+    train(small_run(tmp_path / "first", recipe))
+    seen = []
+    monkeypatch.setattr(training, "_learn", lambda run, recipe, model, spent: seen.append(model))
+    train(small_run(tmp_path / "second", recipe, start_from=tmp_path / "first"))
+    first = seen[0].policy.mlp_extractor.policy_net[0].weight.detach().numpy().T
+    np.testing.assert_array_equal(first, layers(tmp_path / "first")[0])
+
+
+def test_bad_runs(tmp_path, recipe):
+    with pytest.raises(FileNotFoundError, match="no training run"):
+        resume(tmp_path / "nothing")
+    with pytest.raises(ValueError, match="algorithm must be one of 'ppo'"):
+        train(TrainingRun(folder=tmp_path / "x", algorithm="pppo"))
+    with pytest.raises(ValueError, match="steps must be at least 1, got 0"):
+        TrainingRun(folder=tmp_path, steps=0)
+    with pytest.raises(ValueError, match="seed must lie between 0 and 4999999, got -1"):
+        TrainingRun(folder=tmp_path, seed=-1)
+    with pytest.raises(FileNotFoundError, match="holds no checkpoint"):
+        train(small_run(tmp_path / "y", recipe, start_from=tmp_path / "z"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [", "no YAML"),
+        ("a: 1", "needs an entry"),
+        ("HydroneGym/Mission-v0: {n_envs: 4}", "lacks n_timesteps, policy"),
+        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P}\nmissions: {a: 3}", "must sum to n_envs = 4"),
+    ],
+)
+def test_bad_recipes(tmp_path, text, message):
+    path = tmp_path / "bad.yml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        load_recipe("ppo", path)
+
+
+def test_the_packaged_recipe():
+    recipe = load_recipe("ppo")
+    assert recipe.rows == 512
+    schedule = recipe.arguments()["learning_rate"]
+    assert (schedule(1.0), schedule(0.5), schedule(0.0)) == (5e-4, 2.5e-4, 0.0)
+    names = {spec.name for spec in dataclasses.fields(TrainingRun)}
+    assert {"seed", "steps", "threads"} <= names
+
+
+def test_mission_mix_is_its_parts():
+    """Rows of the mix are the rows of the parts, seeded one after the other."""
+    mix = MissionMix({ENV_ID: 3, "HydroneGym/WaterToAir-v0": 2})
+    mix.seed(7)
+    observation = mix.reset()
+    second = mix.parts[1].env
+    goals = second._batch.episodes.rows["goal"]
+    np.testing.assert_array_equal(goals, [[-9.0, 9.0, 7.0]] * 2)
+    alone = MissionMix({"HydroneGym/WaterToAir-v0": 2})
+    alone.seed(10)
+    np.testing.assert_array_equal(alone.reset(), observation[3:])
+    actions = np.full((5, 3), 0.3, np.float32)
+    ours, theirs = mix.step(actions), alone.step(actions[3:])
+    for mine, other in zip(ours[:3], theirs[:3], strict=True):
+        np.testing.assert_array_equal(mine[3:], other)
+    assert len(ours[3]) == 5
+    assert mix.get_attr("num_envs") == [3, 3, 3, 2, 2]
+    with pytest.raises(ValueError, match="at least one environment"):
+        MissionMix({})
+
+
+def test_tanh():
+    x = torch.linspace(-30.0, 30.0, 4001, dtype=torch.float64, requires_grad=True)
+    y = Tanh()(x)
+    torch.testing.assert_close(y, torch.tanh(x), atol=1e-12, rtol=0.0)
+    y.sum().backward()
+    torch.testing.assert_close(x.grad, 1.0 - torch.tanh(x.detach()) ** 2, atol=1e-12, rtol=0.0)
+    single = torch.linspace(-9.0, 9.0, 4001)
+    torch.testing.assert_close(Tanh()(single), torch.tanh(single), atol=3e-7, rtol=0.0)
+
+
+def test_held_out_seeds_lie_beyond_training():
+    largest = HELD_OUT // 2 - 1
+    TrainingRun(folder=Path("x"), seed=largest)
+    assert largest + load_recipe("ppo").rows < HELD_OUT
