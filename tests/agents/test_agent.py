@@ -153,8 +153,12 @@ def test_networks_that_do_not_fit(folder):
     good = read_agent(folder).network
     wrong = np.zeros((68, 2), np.float32)
     with pytest.raises(ValueError, match="layer 1 does not fit"):
-        Network(weights=(wrong, *good.weights[1:]), biases=(np.zeros(2, np.float32), *good.biases[1:]),
-                activation="tanh", output="linear")
+        Network(
+            weights=(wrong, *good.weights[1:]),
+            biases=(np.zeros(2, np.float32), *good.biases[1:]),
+            activation="tanh",
+            output="linear",
+        )
     with pytest.raises(ValueError, match="not finite"):
         Network(weights=(wrong * np.nan,), biases=(np.zeros(2, np.float32),), activation="tanh", output="linear")
     small = Network(weights=(wrong,), biases=(np.zeros(2, np.float32),), activation="tanh", output="linear")
