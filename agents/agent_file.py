@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from gymnasium.envs.registration import registry
 
 from agents.network import Network
@@ -52,6 +51,8 @@ def observation_fingerprint() -> str:
 
 def save_agent(agent: AgentFile, folder: Path) -> None:
     """Write an agent to a folder, made if missing; raises OSError when that fails."""
+    import yaml  # comes with the extra `agents`
+
     folder.mkdir(parents=True, exist_ok=True)
     network = agent.network
     arrays = {f"weight_{k}": weight for k, weight in enumerate(network.weights)}
@@ -79,6 +80,8 @@ def read_agent(folder: Path) -> AgentFile:
     Raises FileNotFoundError if there is none, ValueError naming the file for one that is foreign, damaged, of another
     format version, or trained for an environment or an observation that this package does not have.
     """
+    import yaml
+
     text = folder if folder.suffix in (".yaml", ".yml") else folder / TEXT
     if not text.is_file():
         raise FileNotFoundError(f"no agent at {folder}: {text} does not exist")

@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import NDArray
 
 import hydrone_gym  # noqa: F401  (registers the ids)
 from hydrone_gym.evaluation.policy import Policy
@@ -57,17 +58,20 @@ def evaluate(
         options: keyword options of the environment.
     """
     rows = gym.make_vec(mission, num_envs=episodes, vectorization_mode="vector_entry_point", **(options or {}))
-    observation, info = rows.reset(seed=seed)
-    starts, memory = np.ones(episodes, bool), None
+    observation, _ = rows.reset(seed=seed)
+    running, memory, starts = np.arange(episodes), None, np.ones(episodes, bool)
     outcome = np.zeros(episodes, np.int64)
     time, energy = np.zeros(episodes), np.zeros(episodes)
-    while not outcome.all():
-        actions, memory = policy.predict(observation, state=memory, episode_start=starts, deterministic=True)
-        observation, _, terminated, truncated, info = rows.step(actions)
-        starts = terminated | truncated
-        first = (outcome == 0) & starts  # rows fly on after their first episode; what they do then does not count
-        outcome[first] = info["outcome"][first]
-        time[first], energy[first] = info["time"][first], info["energy"][first]
+    while len(running):
+        # rows fly on after their first episode; what they do then does not count, so the policy is spared it
+        seen = {key: value[running] for key, value in observation.items()}
+        actions = observation["reference"].astype(np.float32)
+        actions[running], memory = policy.predict(seen, state=memory, episode_start=starts, deterministic=True)
+        observation, _, _, _, info = rows.step(actions)
+        outcome[running] = info["outcome"][running]
+        time[running], energy[running] = info["time"][running], info["energy"][running]
+        on = np.flatnonzero(outcome[running] == Outcome.RUNNING)
+        running, memory, starts = running[on], _rows_of(memory, on), np.zeros(len(on), bool)
     rows.close()
     arrived = outcome == Outcome.GOAL
     count = int(arrived.sum())
@@ -80,6 +84,17 @@ def evaluate(
         time=float(time[arrived].mean()) if count else None,
         energy=float(energy[arrived].mean()) if count else None,
     )
+
+
+def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
+    """Pick rows out of a policy's memory: arrays, tuples with an entry a row, and named tuples of such things."""
+    if memory is None:
+        return None
+    if hasattr(memory, "_fields"):
+        return type(memory)(*(_rows_of(part, rows) for part in memory))
+    if isinstance(memory, np.ndarray):
+        return memory[rows]
+    return tuple(memory[row] for row in rows)
 
 
 def score_table(scores: Sequence[Score]) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from agents.shielded import ShieldedVecEnv
 from agents.vec_env import HydroneVecEnv
 
 
@@ -15,16 +16,20 @@ class MissionMix(VecEnv):
     Args:
         missions: rows an environment id.
         options: keyword options of the environments, the same for all.
+        shield: whether they fly behind the shield.
 
     Raises:
         ValueError: no missions at all; TypeError or ValueError for what an environment refuses.
     """
 
-    def __init__(self, missions: Mapping[str, int], options: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, missions: Mapping[str, int], options: Mapping[str, Any] | None = None, *, shield: bool = False
+    ) -> None:
         """Make the parts."""
         if not missions:
             raise ValueError("missions must name at least one environment")
-        self.parts = [HydroneVecEnv(env_id, rows, **(options or {})) for env_id, rows in missions.items()]
+        kind = ShieldedVecEnv if shield else HydroneVecEnv
+        self.parts = [kind(env_id, rows, **(options or {})) for env_id, rows in missions.items()]
         self._edges = np.cumsum([0, *missions.values()]).tolist()
         first = self.parts[0]
         super().__init__(self._edges[-1], first.observation_space, first.action_space)

@@ -22,6 +22,7 @@ class Recipe:
         missions: rows an environment id, in order.
         policy: name of the policy class of Stable-Baselines3.
         settings: the other arguments of the algorithm, as written in the file.
+        shield: whether the rows fly behind the shield.
     """
 
     algorithm: str
@@ -29,6 +30,7 @@ class Recipe:
     missions: dict[str, int]
     policy: str
     settings: dict[str, Any]
+    shield: bool = False
 
     @property
     def rows(self) -> int:
@@ -63,7 +65,10 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     missions = content.get("missions", {ENV_ID: count})
     if not isinstance(missions, dict) or sum(missions.values()) != count:
         raise ValueError(f"{file}: the rows of missions must sum to n_envs = {count}, got {missions!r}")
-    return Recipe(algorithm=algorithm, steps=int(steps), missions=missions, policy=policy, settings=settings)
+    shield = bool(content.get("shield", False))
+    return Recipe(
+        algorithm=algorithm, steps=int(steps), missions=missions, policy=policy, settings=settings, shield=shield
+    )
 
 
 def _scheduled(value: Any) -> Any:

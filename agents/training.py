@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import torch
 import yaml
 from stable_baselines3 import PPO
@@ -26,8 +27,9 @@ from agents.export import export_agent
 from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, Recipe, load_recipe
 from agents.run_log import CHECKPOINTS, RunLog, draw_curve
+from planners.shield import Shield
 
-ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO}
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "ppo_shielded": PPO}  # of each recipe
 CONFIG = "config.yaml"
 PACKAGES = ("hydrone-gym", "stable_baselines3", "torch", "gymnasium", "numpy", "numba")
 
@@ -92,7 +94,7 @@ def train(run: TrainingRun) -> list[Score]:
     if (run.folder / CONFIG).exists():
         raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
     torch.set_num_threads(run.threads)
-    rows = MissionMix(recipe.missions, run.options)
+    rows = MissionMix(recipe.missions, run.options, shield=recipe.shield)
     model = ALGORITHMS[run.algorithm](recipe.policy, rows, **_arguments(recipe), seed=run.seed, device="cpu")
     if run.start_from is not None:
         model.set_parameters(_latest(run.start_from) / MODEL, device="cpu")
@@ -141,18 +143,23 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
     draw_curve(run.folder)
     notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions()}
     save_agent(export_agent(model, run.folder.name, ENV_ID, notes), run.folder / "agent")
-    scores = evaluate_missions(run)
+    scores = evaluate_missions(run, shield=recipe.shield)
     text = json.dumps([dataclasses.asdict(score) for score in scores], indent=1)
     (run.folder / "evaluation.json").write_text(text + "\n", encoding="utf-8")
     return scores
 
 
-def evaluate_missions(run: TrainingRun) -> list[Score]:
-    """Fly a run's finished agent on held-out worlds of every mission."""
+def evaluate_missions(run: TrainingRun, *, shield: bool) -> list[Score]:
+    """Fly a run's finished agent, behind the shield if it was trained there, on held-out worlds of every mission."""
     if run.evaluation_episodes == 0:
         return []
-    policy = load_agent(run.folder / "agent")
-    return [evaluate(policy, id_, episodes=run.evaluation_episodes, options=run.options) for id_ in MISSIONS]
+    scores = []
+    for mission in MISSIONS:
+        env = gym.make(mission, **run.options)
+        agent = load_agent(run.folder / "agent", env)
+        policy = Shield.for_env(agent, env) if shield else agent
+        scores.append(evaluate(policy, mission, episodes=run.evaluation_episodes, options=run.options))
+    return scores
 
 
 def _write_config(run: TrainingRun, recipe: Recipe) -> None:

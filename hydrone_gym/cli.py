@@ -18,6 +18,7 @@ import gymnasium as gym
 import numpy as np
 import tyro
 
+from agents.train_command import Train
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
@@ -232,7 +233,7 @@ def _cells(record: dict[str, Any]) -> dict[str, str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `arguments` default to those of the process."""
     command = tyro.extras.subcommand_cli_from_dict(
-        {"fly": Fly},
+        {"fly": Fly, "train": Train},
         prog="hydrone",
         description="Fly the HyDrone in air, through the water surface and below it.",
         args=arguments,

@@ -3,9 +3,9 @@
 A reference is accepted if the vehicle, having followed it for a period, can still hover to rest without touching a
 known obstacle, the box, or the surface in a rough crossing, and without leaving space that has been sensed. Else the
 first of `CANDIDATES` that can is flown instead: the same step shortened, turned aside, or shifted in height. If none
-can, the vehicle goes on to the hover verified last. So at any moment a verified way to rest is known, and a vehicle that
-flies as the model says meets only what cannot be known. The same stop invariant keeps the CL-RRT safe; the shield has no
-tree, and leaves finding the way to the policy.
+can, the vehicle goes on to the hover verified last. So a verified way to rest is known at any moment, and a vehicle
+that flies as the model says meets only what cannot be known. The same invariant keeps the CL-RRT safe; the shield has
+no tree, and leaves finding the way to the policy.
 """
 
 from collections.abc import Mapping
@@ -14,25 +14,14 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hydrone_gym._jit import inlined, kernel, routine
-from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.advance import advance
 from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS, new_block
-from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rows import load_row, new_rows, store_row
+from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.world.obstacles import swept_distance
-from planners.cl_rrt.references import hover_reference, inside
 from planners.policy import KEYS, simulation_of
+from planners.stop_check import HELD, guard
 
-HELD = -1  # choice: no candidate was safe, the hover verified last goes on
-MARGIN = 0.03  # m of clearance that checked motion keeps
-LOOK_AHEAD = 9  # periods that a hover is simulated for
-_REST = 0.03  # m/s: slower than this in air is rest
-_DRIFT = 12.0  # s: what is left of sway at the end of a stop in water goes on for a while
-_GIVE = 0.02  # m: how much nearer than now a vehicle within the margin may come
-_LEAST = 0.005  # m
+__all__ = ["CANDIDATES", "HELD", "Shield", "ShieldState"]
+
 _NOWHERE = 1e160  # m: its square overflows, so a sphere there is at distance inf
 
 
@@ -47,128 +36,6 @@ def _candidates() -> NDArray[np.float64]:
 
 
 CANDIDATES = _candidates()
-
-
-@routine
-def _follow(row, eye, rx, ry, rz, psi, spheres, closest, margin, ticks, model, block, log):
-    """Propagate a row one period toward a reference; return (whether that is safe, whether it arrives).
-
-    Args:
-        row: record of dtype `ROW`, changed in place.
-        eye: (3,) where obstacles were sensed from, m.
-        rx, ry, rz, psi: the reference, m and rad.
-        spheres, closest: flat known spheres of one lane, as in `advance`.
-        margin: clearance to keep, m.
-        ticks: of a period.
-        model: `Model`.
-        block, log: working storage of one lane.
-    """
-    b, w = block[0], model.world
-    row.ticks, row.clearance, row.outcome, row.crossings = 0.0, np.inf, RUNNING, 0.0
-    load_row(b, 0, row, (rx, ry, rz, psi))
-    advance(block, log, spheres, closest, closest.size, model, 0, ticks, ticks)
-    store_row(b, 0, row)
-    row.reference[0], row.reference[1], row.reference[2], row.reference[3] = rx, ry, rz, psi
-    smooth = True
-    for slot in range(min(int(row.crossings), log.shape[1])):
-        smooth = smooth and log[0, slot, 2] <= w.rough_speed and np.cos(log[0, slot, 3]) >= w.rough_cos_tilt
-    s = row.state
-    dx, dy, dz = s[0] - eye[0], s[1] - eye[1], s[2] - eye[2]
-    reach = w.sensor_range - model.vehicle.radius
-    sensed = dx * dx + dy * dy + dz * dz <= reach * reach
-    arrives = row.outcome == GOAL
-    return (row.outcome == RUNNING or arrives) and row.clearance >= margin and smooth and sensed, arrives
-
-
-@inlined
-def _clearance(ax, ay, az, bx, by, bz, spheres, count, radius):
-    """Least clearance (m) of a straight path from the known spheres."""
-    least = np.inf
-    for j in range(count):
-        k = 4 * j
-        distance = swept_distance(ax, ay, az, bx, by, bz, spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
-        least = min(least, distance - radius)
-    return least
-
-
-@inlined
-def _single(value):
-    """Round to the precision of the action space: what is checked is what is flown."""
-    return float(np.float32(value))
-
-
-@routine
-def _verify(row, scratch, rx, ry, rz, psi, hover, spheres, closest, margin, ticks, model, block, log):
-    """Whether a reference can be followed to rest; writes the hover that does it to `hover` (4,)."""
-    eye = row.state
-    for c in range(12):
-        scratch.state[c] = row.state[c]
-    for c in range(4):
-        scratch.integral[c], scratch.reference[c] = row.integral[c], row.reference[c]
-    for c in range(3):
-        scratch.goal[c] = row.goal[c]
-    safe, arrives = _follow(scratch, eye, rx, ry, rz, psi, spheres, closest, margin, ticks, model, block, log)
-    s = scratch.state
-    hx, hy, hz, heading = hover_reference(scratch, model)
-    hover[0], hover[1], hover[2], hover[3] = _single(hx), _single(hy), _single(hz), _single(heading)
-    for _ in range(LOOK_AHEAD):
-        if not safe or arrives:
-            return safe
-        if s[2] > model.world.zone and s[6] * s[6] + s[7] * s[7] + s[8] * s[8] < _REST * _REST:
-            return True
-        safe, arrives = _follow(
-            scratch, eye, hover[0], hover[1], hover[2], hover[3], spheres, closest, margin, ticks, model, block, log
-        )
-    if safe and s[2] < 0.0:
-        x, y = s[0] + _DRIFT * s[6], s[1] + _DRIFT * s[7]
-        return _clearance(s[0], s[1], s[2], x, y, s[2], spheres, closest.size, model.vehicle.radius) >= margin
-    return safe
-
-
-@kernel
-def _guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, block, log, sent, held, choice):
-    """Check every row's reference and replace it where it is not safe.
-
-    Args:
-        rows: (n,) dtype `ROW`: state, memory, reference in force and goal.
-        proposed: (n, 4) references, m and rad.
-        candidates: (k, 3), see `CANDIDATES`.
-        spheres: (n, 4 M) known spheres, unused ones far away.
-        values: packed `Model`.
-        ticks: of a period.
-        scratch: (1,) dtype `ROW`.
-        closest: (M,) working storage; block, log: that of one lane.
-        sent: (n, 4) references to fly, written.
-        held: (n, 4) hovers verified last, updated.
-        choice: (n,) 0: as proposed, k: candidate k, HELD; written.
-    """
-    model = unpack_model(values)
-    w, spare = model.world, scratch[0]
-    hover = np.empty(4)
-    for n in range(rows.size):
-        row, known, s = rows[n], spheres[n], rows[n].state
-        left = _clearance(s[0], s[1], s[2], s[0], s[1], s[2], known, closest.size, model.vehicle.radius) - _GIVE
-        margin = max(min(MARGIN, left), _LEAST)
-        dx, dy, dz = proposed[n, 0] - s[0], proposed[n, 1] - s[1], proposed[n, 2] - s[2]
-        choice[n] = HELD
-        for k in range(candidates.shape[0] + 1):
-            rx, ry, rz, psi = proposed[n, 0], proposed[n, 1], proposed[n, 2], proposed[n, 3]
-            if k > 0:
-                scale, lift = candidates[k - 1, 0], candidates[k - 1, 2]
-                sine, cosine = sincos(candidates[k - 1, 1])
-                rx = inside(s[0] + scale * (cosine * dx - sine * dy), w.x_min, w.x_max)
-                ry = inside(s[1] + scale * (sine * dx + cosine * dy), w.y_min, w.y_max)
-                rz = inside(s[2] + scale * dz + lift, w.z_min, w.z_max)
-            rx, ry, rz, psi = _single(rx), _single(ry), _single(rz), _single(psi)
-            if _verify(row, spare, rx, ry, rz, psi, hover, known, closest, margin, ticks, model, block, log):
-                choice[n] = k
-                sent[n, 0], sent[n, 1], sent[n, 2], sent[n, 3] = rx, ry, rz, psi
-                for c in range(4):
-                    held[n, c] = hover[c]
-                break
-        if choice[n] == HELD:
-            for c in range(4):
-                sent[n, c] = held[n, c]
 
 
 class ShieldState(NamedTuple):
@@ -273,7 +140,7 @@ class Shield:
         spheres[spheres[:, :, 3] <= 0.0] = (_NOWHERE, 0.0, 0.0, 0.0)
         sent, held = np.empty((count, 4)), np.array(held, np.float64)
         choice = np.empty(count, np.int64)
-        _guard(
+        guard(
             rows,
             np.minimum(np.maximum(proposed, self._low), self._high),
             CANDIDATES,

@@ -40,6 +40,7 @@ serve(
     version("crazyflow"),
     {
         f"N = {worlds}, {substeps} substeps": make(worlds, substeps)
-        for worlds, substeps in ((1, 10), (64, 10), (1024, 10), (4096, 10), (1024, 50), (4096, 50))
+        for substeps in (10, 50)
+        for worlds in (1, 64, 1024, 4096)
     },
 )

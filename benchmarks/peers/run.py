@@ -57,7 +57,12 @@ class Worker:
         self.name = name
         with self._log.open("w", encoding="utf-8") as log:
             self._process = subprocess.Popen(
-                [str(python), str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
+                [str(python), str(script)],
+                cwd=cache,  # some libraries write logs where they stand
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
             )
         listing = self._read()
         self.version: str = listing["version"]
@@ -159,7 +164,7 @@ def sheet(measured: dict[str, Any]) -> Sheet:
 
 def main() -> int:
     settings = tyro.cli(Settings, description=__doc__)
-    workers, missing = start(settings.cache)
+    workers, missing = start(settings.cache.resolve())
     try:
         measured = {"rows": measure(workers, settings), "missing": missing}
     finally:

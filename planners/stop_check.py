@@ -1,0 +1,158 @@
+"""The check behind the shield, as kernels: can a reference be followed to rest, and if not, what can instead."""
+
+import numpy as np
+
+from hydrone_gym._jit import inlined, kernel, routine
+from hydrone_gym.physics.trigonometry import sincos
+from hydrone_gym.simulation.advance import advance
+from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.simulation.outcome import GOAL, RUNNING
+from hydrone_gym.simulation.rows import load_row, store_row
+from hydrone_gym.world.obstacles import swept_distance
+from planners.cl_rrt.references import hover_reference, inside
+
+HELD = -1  # choice: no candidate was safe, the hover verified last goes on
+MARGIN = 0.03  # m of clearance that checked motion keeps
+LOOK_AHEAD = 9  # periods that a hover is simulated for
+_REST = 0.03  # m/s: slower than this is rest, but for the drift under water
+_NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
+_DRIFT = 12.0  # s: what is left of sway at the end of a stop in water goes on for a while
+_GIVE = 0.02  # m: how much nearer than now a vehicle within the margin may come
+_LEAST = 0.005  # m
+
+
+@routine
+def _follow(row, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, model, block, log):
+    """Propagate a row one period toward a reference; return (whether that is safe, whether it arrives).
+
+    Args:
+        row: record of dtype `ROW`, changed in place.
+        eye: (3,) where obstacles were sensed from, m.
+        rx, ry, rz, psi: the reference, m and rad.
+        spheres, closest, count: flat known spheres of one lane, as in `advance`.
+        margin: clearance to keep, m.
+        ticks: of a period.
+        model: `Model`.
+        block, log: working storage of one lane.
+    """
+    b, w = block[0], model.world
+    row.ticks, row.clearance, row.outcome, row.crossings = 0.0, np.inf, RUNNING, 0.0
+    load_row(b, 0, row, (rx, ry, rz, psi))
+    advance(block, log, spheres, closest, count, model, 0, ticks, ticks)
+    store_row(b, 0, row)
+    row.reference[0], row.reference[1], row.reference[2], row.reference[3] = rx, ry, rz, psi
+    smooth = True
+    for slot in range(min(int(row.crossings), log.shape[1])):
+        smooth = smooth and log[0, slot, 2] <= w.rough_speed and np.cos(log[0, slot, 3]) >= w.rough_cos_tilt
+    s = row.state
+    dx, dy, dz = s[0] - eye[0], s[1] - eye[1], s[2] - eye[2]
+    reach = w.sensor_range - model.vehicle.radius
+    sensed = dx * dx + dy * dy + dz * dz <= reach * reach
+    arrives = row.outcome == GOAL
+    return (row.outcome == RUNNING or arrives) and row.clearance >= margin and smooth and sensed, arrives
+
+
+@inlined
+def _clearance(ax, ay, az, bx, by, bz, spheres, count, radius):
+    """Least clearance (m) of a straight path from the known spheres."""
+    least = np.inf
+    for j in range(count):
+        k = 4 * j
+        distance = swept_distance(ax, ay, az, bx, by, bz, spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
+        least = min(least, distance - radius)
+    return least
+
+
+@inlined
+def _near(x, y, z, spheres, near):
+    """Copy the spheres near a point to the front of `near`; return how many they are."""
+    count = 0
+    for j in range(spheres.size // 4):
+        k = 4 * j
+        if swept_distance(x, y, z, x, y, z, spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3]) <= _NEAR:
+            for c in range(4):
+                near[4 * count + c] = spheres[k + c]
+            count += 1
+    return count
+
+
+@inlined
+def _single(value):
+    """Round to the precision of the action space: what is checked is what is flown."""
+    return float(np.float32(value))
+
+
+@routine
+def _verify(row, scratch, rx, ry, rz, psi, hover, spheres, closest, count, margin, ticks, model, block, log):
+    """Whether a reference can be followed to rest; writes the hover that does it to `hover` (4,)."""
+    eye = row.state
+    for c in range(12):
+        scratch.state[c] = row.state[c]
+    for c in range(4):
+        scratch.integral[c], scratch.reference[c] = row.integral[c], row.reference[c]
+    for c in range(3):
+        scratch.goal[c] = row.goal[c]
+    safe, arrives = _follow(scratch, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, model, block, log)
+    s = scratch.state
+    hx, hy, hz, heading = hover_reference(scratch, model)
+    hover[0], hover[1], hover[2], hover[3] = _single(hx), _single(hy), _single(hz), _single(heading)
+    for _ in range(LOOK_AHEAD):
+        if not safe or arrives:
+            return safe
+        if abs(s[2]) > model.world.zone and s[6] * s[6] + s[7] * s[7] + s[8] * s[8] < _REST * _REST:
+            break
+        hx, hy, hz, heading = hover[0], hover[1], hover[2], hover[3]
+        safe, arrives = _follow(
+            scratch, eye, hx, hy, hz, heading, spheres, closest, count, margin, ticks, model, block, log
+        )
+    if safe and s[2] < 0.0:
+        x, y = s[0] + _DRIFT * s[6], s[1] + _DRIFT * s[7]
+        return _clearance(s[0], s[1], s[2], x, y, s[2], spheres, count, model.vehicle.radius) >= margin
+    return safe
+
+
+@kernel
+def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, block, log, sent, held, choice):
+    """Check every row's reference and replace it where it is not safe.
+
+    Args:
+        rows: (n,) dtype `ROW`: state, memory, reference in force and goal.
+        proposed: (n, 4) references, m and rad.
+        candidates: (k, 3), see `CANDIDATES`.
+        spheres: (n, 4 M) known spheres, unused ones far away.
+        values: packed `Model`.
+        ticks: of a period.
+        scratch: (1,) dtype `ROW`.
+        closest: (M,) working storage; block, log: that of one lane.
+        sent: (n, 4) references to fly, written.
+        held: (n, 4) hovers verified last, updated.
+        choice: (n,) 0: as proposed, k: candidate k, HELD; written.
+    """
+    model = unpack_model(values)
+    w, spare = model.world, scratch[0]
+    hover, near = np.empty(4), np.empty(spheres.shape[1])
+    for n in range(rows.size):
+        row, s = rows[n], rows[n].state
+        count = _near(s[0], s[1], s[2], spheres[n], near)
+        left = _clearance(s[0], s[1], s[2], s[0], s[1], s[2], near, count, model.vehicle.radius) - _GIVE
+        margin = max(min(MARGIN, left), _LEAST)
+        dx, dy, dz = proposed[n, 0] - s[0], proposed[n, 1] - s[1], proposed[n, 2] - s[2]
+        choice[n] = HELD
+        for k in range(candidates.shape[0] + 1):
+            rx, ry, rz, psi = proposed[n, 0], proposed[n, 1], proposed[n, 2], proposed[n, 3]
+            if k > 0:
+                scale, lift = candidates[k - 1, 0], candidates[k - 1, 2]
+                sine, cosine = sincos(candidates[k - 1, 1])
+                rx = inside(s[0] + scale * (cosine * dx - sine * dy), w.x_min, w.x_max)
+                ry = inside(s[1] + scale * (sine * dx + cosine * dy), w.y_min, w.y_max)
+                rz = inside(s[2] + scale * dz + lift, w.z_min, w.z_max)
+            rx, ry, rz, psi = _single(rx), _single(ry), _single(rz), _single(psi)
+            if _verify(row, spare, rx, ry, rz, psi, hover, near, closest, count, margin, ticks, model, block, log):
+                choice[n] = k
+                sent[n, 0], sent[n, 1], sent[n, 2], sent[n, 3] = rx, ry, rz, psi
+                for c in range(4):
+                    held[n, c] = hover[c]
+                break
+        if choice[n] == HELD:
+            for c in range(4):
+                sent[n, c] = held[n, c]

@@ -1,0 +1,64 @@
+"""`hydrone train` from the command line, and the plain Stable-Baselines3 example of docs/training.md."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from agents import load_agent
+from hydrone_gym.cli import main
+from tests.agents.test_training import SMALL
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "small.yml"
+    path.write_text(yaml.safe_dump(SMALL))
+    return path
+
+
+def test_train_then_shield_then_resume(tmp_path, recipe, capsys):
+    first, second = tmp_path / "first", tmp_path / "second"
+    options = ["--recipe", str(recipe), "--evaluation-episodes", "4", "--json"]
+    assert main(["train", "ppo", "--out", str(first), *options]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["folder"] == str(first)
+    assert [score["episodes"] for score in document["scores"]] == [4, 4, 4]
+    assert load_agent(first / "agent").file.algorithm == "PPO"
+
+    recipe.write_text(yaml.safe_dump({**SMALL, "shield": True}))
+    assert main(["train", "ppo_shielded", "--start-from", str(first), "--out", str(second), *options]) == 0
+    failures = [name for score in json.loads(capsys.readouterr().out)["scores"] for name in score["outcomes"]]
+    assert not {"COLLISION", "OUT_OF_BOUNDS", "ROUGH_TRANSITION"} & set(failures)
+
+    assert main(["train", "--resume", str(second)]) == 0
+    printed = capsys.readouterr()
+    assert "HydroneGym/AirToWater-v0" in printed.out
+
+
+def test_bad_options(tmp_path, capsys):
+    assert main(["train", "ppo_shielded"]) == 2
+    assert "--start-from" in capsys.readouterr().err
+    assert main(["train", "--resume", str(tmp_path)]) == 2
+    assert "no training run" in capsys.readouterr().err
+    assert main(["train", "--resume", str(tmp_path), "--seed", "3"]) == 2
+    assert "--resume excludes seed" in capsys.readouterr().err
+    assert main(["train", "--out", str(tmp_path), "--seed", "-1"]) == 2
+    assert "seed must lie between" in capsys.readouterr().err
+
+
+def test_the_example_of_the_docs(tmp_path, monkeypatch):
+    """The first Python block trains with plain Stable-Baselines3; here with fewer steps."""
+    text = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
+    block = re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0]
+    assert len(block.strip().splitlines()) <= 10
+    short = block.replace("1_000_000", "512").replace("num_envs=256", "num_envs=16").replace("n_steps=64", "n_steps=16")
+    assert short != block
+    monkeypatch.chdir(tmp_path)
+    space: dict = {}
+    exec(compile(short, "docs/training.md", "exec"), space)
+    assert 0.0 <= space["score"].success <= 1.0
