@@ -60,10 +60,9 @@ INLINE void sweep(Block *restrict b, int i, const double *restrict sphere, doubl
     double dx = b->x[i] - b->saved_x[i], dy = b->y[i] - b->saved_y[i], dz = b->z[i] - b->saved_z[i];
     double ox = sphere[i] - b->saved_x[i], oy = sphere[LANES + i] - b->saved_y[i];
     double oz = sphere[2 * LANES + i] - b->saved_z[i];
-    double along = ox * dx + oy * dy + oz * dz, length2 = dx * dx + dy * dy + dz * dz;
-    double quotient = along / length2;
-    double t = (along > 0.0) & (length2 > 0.0) ? quotient : 0.0;
-    t = t > 1.0 ? 1.0 : t;
+    double t = (ox * dx + oy * dy + oz * dz) * b->inverse_length2[i];
+    t = t > 0.0 ? t : 0.0;
+    t = t < 1.0 ? t : 1.0;
     ox = ox - t * dx;
     oy = oy - t * dy;
     oz = oz - t * dz;
@@ -133,6 +132,11 @@ static void advance(Block *restrict b, double *log, const double *restrict obsta
         for (int sub = 0; sub < SUBSTEPS; sub++)
             for (int i = 0; i < LANES; i++)
                 substep(b, i, (tick * SUBSTEPS + sub + 1) * inverse_substeps, inverse_period, k);
+        for (int i = 0; i < LANES; i++) {
+            double dx = b->x[i] - b->saved_x[i], dy = b->y[i] - b->saved_y[i], dz = b->z[i] - b->saved_z[i];
+            double length2 = dx * dx + dy * dy + dz * dz, inverse = 1.0 / length2;
+            b->inverse_length2[i] = length2 > 0.0 ? inverse : 0.0;
+        }
         for (long j = 0; j < count; j++)
             for (int i = 0; i < LANES; i++)
                 sweep(b, i, obstacles + 4 * j * LANES, closest + j * LANES, k->vehicle.radius);

@@ -16,7 +16,7 @@ from hydrone_gym.physics.rotors import shaft_power
 from hydrone_gym.physics.trigonometry import wrap
 from hydrone_gym.simulation.block import LOGGED_CROSSINGS, keep_or_restore, load_state, save_lane, store_state
 from hydrone_gym.simulation.outcome import COLLISION, DIVERGED, GOAL, OUT_OF_BOUNDS, ROUGH_TRANSITION, RUNNING
-from hydrone_gym.world.obstacles import swept_distance
+from hydrone_gym.world.obstacles import inverse_square, path_distance
 
 DT = 0.01  # s: physics and control
 SUBSTEPS = 5  # physics steps a tick
@@ -84,6 +84,8 @@ def end_tick(b, i, model):
     """Judge lane i: outcome, and the state it keeps. A finished lane stays frozen where it ended."""
     w = model.world
     s = load_state(b, i)
+    before = b.outcome[i]
+    running = before == RUNNING
     attitude = attitude_of(s)
     speed2 = s.vx * s.vx + s.vy * s.vy + s.vz * s.vz
     rate2 = s.p * s.p + s.q * s.q + s.r * s.r
@@ -102,8 +104,7 @@ def end_tick(b, i, model):
     outcome = outcome if inside else OUT_OF_BOUNDS
     outcome = COLLISION if b.clearance[i] <= 0.0 else outcome
     outcome = outcome if sane else DIVERGED
-    running = b.outcome[i] == RUNNING
-    b.outcome[i] = outcome if running else b.outcome[i]
+    b.outcome[i] = outcome if running else before
     b.ticks[i] += 1.0 if running else 0.0
     b.crossed[i] = b.crossed[i] if running and sane else 0.0
     keep_or_restore(b, i, running and sane)
@@ -113,13 +114,15 @@ def end_tick(b, i, model):
 def sweep(b, i, j, lanes, obstacles, closest, radius):
     """Measure lane i's path of this tick against obstacle j."""
     k = 4 * j * lanes + i
-    distance = swept_distance(
-        b.saved_x[i],
-        b.saved_y[i],
-        b.saved_z[i],
-        b.x[i],
-        b.y[i],
-        b.z[i],
+    ax, ay, az = b.saved_x[i], b.saved_y[i], b.saved_z[i]
+    distance = path_distance(
+        ax,
+        ay,
+        az,
+        b.x[i] - ax,
+        b.y[i] - ay,
+        b.z[i] - az,
+        b.inverse_length2[i],
         obstacles[k],
         obstacles[k + lanes],
         obstacles[k + 2 * lanes],
@@ -171,6 +174,8 @@ def advance(block, log, obstacles, closest, count, model, first, last, ticks):
             fraction = (tick * SUBSTEPS + sub + 1) * inverse_substeps
             for i in range(lanes):
                 substep(b, i, fraction, inverse_period, model)
+        for i in range(lanes):
+            b.inverse_length2[i] = inverse_square(b.x[i] - b.saved_x[i], b.y[i] - b.saved_y[i], b.z[i] - b.saved_z[i])
         for j in range(count):
             for i in range(lanes):
                 sweep(b, i, j, lanes, obstacles, closest, model.vehicle.radius)

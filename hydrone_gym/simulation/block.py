@@ -19,7 +19,7 @@ _INTEGRAL = tuple(f"integral_{name}" for name in Integral._fields)
 _SAVED = tuple(f"saved_{name}" for name in (*_STATE, *_INTEGRAL, "energy"))
 _REFERENCE = ("old_x", "old_y", "old_z", "old_psi", "move_x", "move_y", "move_z", "move_psi")
 _EPISODE = ("goal_x", "goal_y", "goal_z", "ticks", "energy", "clearance", "outcome", "crossings")
-_CROSSING = ("crossed", "cross_direction", "cross_speed2", "cross_cos", "cross_vz")
+_CROSSING = ("crossed", "cross_direction", "cross_speed2", "cross_cos", "cross_vz", "inverse_length2")
 
 ROW = np.dtype(
     [
@@ -103,8 +103,18 @@ def keep_or_restore(b, i, keep):
     b.psi[i] = s.psi if keep else o.psi
     b.vx[i], b.vy[i], b.vz[i] = (s.vx if keep else o.vx), (s.vy if keep else o.vy), (s.vz if keep else o.vz)
     b.p[i], b.q[i], b.r[i] = (s.p if keep else o.p), (s.q if keep else o.q), (s.r if keep else o.r)
-    b.integral_z[i] = b.integral_z[i] if keep else b.saved_integral_z[i]
-    b.integral_phi[i] = b.integral_phi[i] if keep else b.saved_integral_phi[i]
-    b.integral_theta[i] = b.integral_theta[i] if keep else b.saved_integral_theta[i]
-    b.integral_psi[i] = b.integral_psi[i] if keep else b.saved_integral_psi[i]
-    b.energy[i] = b.energy[i] if keep else b.saved_energy[i]
+    # both sides are loaded before the choice: a load on one side only would keep the loop over lanes scalar
+    z, phi, theta, psi, energy = (
+        b.integral_z[i],
+        b.integral_phi[i],
+        b.integral_theta[i],
+        b.integral_psi[i],
+        b.energy[i],
+    )
+    saved_z, saved_phi, saved_theta = b.saved_integral_z[i], b.saved_integral_phi[i], b.saved_integral_theta[i]
+    saved_psi, saved_energy = b.saved_integral_psi[i], b.saved_energy[i]
+    b.integral_z[i] = z if keep else saved_z
+    b.integral_phi[i] = phi if keep else saved_phi
+    b.integral_theta[i] = theta if keep else saved_theta
+    b.integral_psi[i] = psi if keep else saved_psi
+    b.energy[i] = energy if keep else saved_energy

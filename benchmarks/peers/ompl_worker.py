@@ -1,0 +1,129 @@
+"""OMPL's control RRT on the worlds and with the propagation of CL-RRT; first_solution.py starts it and sends worlds.
+
+It runs in OMPL's own environment, with NumPy, Numba and this project found through PYTHONPATH, so that an edge is the
+same compiled code. A world is one line of JSON on standard input, its result one line on standard output.
+
+What the Python API of OMPL 2.0 allows: state propagation and validity as Python functions, duration and bounds of
+controls, goal bias. What it does not: a propagator that steers, control samplers and directed control samplers of
+one's own, SST and PDST (none of these classes has a constructor in Python). Controls are therefore random.
+"""
+
+import json
+import sys
+import time
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from ompl import base, control, util
+
+from benchmarks.edges import propagate_edges
+from benchmarks.peers.protocol import begin
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.world import World
+from planners.cl_rrt.settings import CLRRTSettings
+from planners.cl_rrt.tree import BACKUP, new_nodes, new_workspace
+
+# An OMPL state is compound: the position, which alone makes distances, and everything else of an edge's end.
+POSITION = 3
+REST = 9 + 4 + 4 + 1  # the other states, controller memory, reference in force, 1 if the edge was free
+WIDE = 1e4  # bounds of what is not sampled for a purpose
+STEP = (1.0, 1.0, 1.0, 0.5)  # a control: how far a period moves the reference from the vehicle at most, m, m, m, rad
+PERIODS = (1, 10)  # a control is held for
+
+
+def bounds(low: Any, high: Any) -> base.RealVectorBounds:
+    """Bounds from two sequences."""
+    made = base.RealVectorBounds(len(low))
+    for k, (least, most) in enumerate(zip(low, high, strict=True)):
+        made.setLow(k, float(least))
+        made.setHigh(k, float(most))
+    return made
+
+
+def spaces(world: World) -> tuple[base.CompoundStateSpace, control.RealVectorControlSpace]:
+    """State and control space."""
+    position, rest = base.RealVectorStateSpace(POSITION), base.RealVectorStateSpace(REST)
+    position.setBounds(bounds(world.lower, world.upper))
+    rest.setBounds(bounds([-WIDE] * REST, [WIDE] * REST))
+    states = base.CompoundStateSpace()
+    states.addSubspace(position, 1.0)
+    states.addSubspace(rest, 0.0)
+    controls = control.RealVectorControlSpace(states, len(STEP))
+    controls.setBounds(bounds([-most for most in STEP], STEP))
+    return states, controls
+
+
+class Edges:
+    """The state propagator: CL-RRT's edge over one period, in one world."""
+
+    def __init__(self, simulation: Simulation, goal: list[float], obstacles: list[list[float]]) -> None:
+        self._simulation, self._goal = simulation, np.array(goal)
+        nodes = new_nodes(2)
+        self._work = new_workspace(nodes, np.array(obstacles).reshape(-1, 4), np.zeros((BACKUP, 4)))
+        # fields lie one after another: 12 states, 4 of controller memory, 4 of reference
+        numbers = nodes.view(np.float64).reshape(len(nodes), -1)
+        self._start, self._end = numbers[0, :20], numbers[1, :20]
+        self._reference = np.zeros((1, 4))
+        self._margin = CLRRTSettings().margin
+        self.count = 0
+
+    def propagate(self, state: Any, move: Any, duration: float, result: Any) -> None:
+        """Fill `result` with the end of the period; OMPL asks for one period at a time."""
+        self.count += 1
+        x, y, z = state[0][0:POSITION]
+        rest = state[1][0 : REST - 1]
+        self._start[:] = [x, y, z, *rest]
+        r, (a, b, c, d) = self._reference[0], move[0:4]
+        r[0], r[1], r[2], r[3] = x + a, y + b, z + c, rest[16] + d
+        free = propagate_edges(
+            self._work, self._simulation.values, self._goal, self._reference, self._margin, self._simulation.ticks
+        )
+        end = self._end.tolist()
+        result[0][0:POSITION] = end[:POSITION]
+        result[1][0:REST] = [*end[POSITION:], float(free)]
+
+
+def is_valid(state: Any) -> bool:
+    """Whether the edge that led here kept its clearance, stayed in bounds, and crossed smoothly if it crossed."""
+    return state[1][REST - 1] > 0.0
+
+
+def solve(simulation: Simulation, request: dict[str, Any]) -> dict[str, Any]:
+    """Plan in one world until the first solution or the limit."""
+    world = simulation.world
+    edges = Edges(simulation, request["goal"], request["obstacles"])
+    states, controls = spaces(world)
+    setup = control.SimpleSetup(controls)
+    setup.setStatePropagator(edges.propagate)
+    setup.setStateValidityChecker(is_valid)
+    information = setup.getSpaceInformation()
+    information.setPropagationStepSize(simulation.period)
+    information.setMinMaxControlDuration(*PERIODS)
+    start, goal = states.allocState(), states.allocState()
+    row = request["row"]
+    start[0][0:POSITION], start[1][0:REST] = row[:POSITION], [*row[POSITION:], 1.0]
+    goal[0][0:POSITION], goal[1][0:REST] = request["goal"], [0.0] * (REST - 1) + [1.0]
+    setup.setStartAndGoalStates(start, goal, world.goal_radius)
+    setup.setPlanner(control.RRT(information))
+    setup.setup()
+    wall, cpu = time.perf_counter(), time.process_time()
+    setup.solve(request["limit"])
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return {"solved": setup.haveExactSolutionPath(), "wall": wall, "cpu": cpu, "edges": edges.count}
+
+
+def main() -> None:
+    """Answer one line for each world, after a first line with the version."""
+    answers = begin()
+    util.setLogLevel(util.LOG_NONE)
+    util.RNG.setSeed(1)  # of the whole process; the planners offer none of their own
+    simulation = Simulation(named_vehicle(sys.argv[1]), World(), float(sys.argv[2]))
+    print(json.dumps({"version": version("ompl")}), file=answers, flush=True)
+    for line in sys.stdin:
+        print(json.dumps(solve(simulation, json.loads(line))), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()
