@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,4 +106,4 @@ def shipped_agents() -> list[str]:
 def _simulation_of(env: Any) -> Simulation:
     from planners.policy import simulation_of
 
-    return cast(Simulation, simulation_of(env))
+    return simulation_of(env)

@@ -75,8 +75,7 @@ class Edges:
         x, y, z = state[0][0:POSITION]
         rest = state[1][0 : REST - 1]
         self._start[:] = [x, y, z, *rest]
-        r, (a, b, c, d) = self._reference[0], move[0:4]
-        r[0], r[1], r[2], r[3] = x + a, y + b, z + c, rest[16] + d
+        self._reference[0] = [x + move[0], y + move[1], z + move[2], rest[16] + move[3]]
         free = propagate_edges(
             self._work, self._simulation.values, self._goal, self._reference, self._margin, self._simulation.ticks
         )

@@ -14,10 +14,16 @@ from planners.cl_rrt.references import AIR_GATE, WATER_GATE, air_reference, wate
 from planners.cl_rrt.tree import OPEN
 
 DRAWS = 6  # uniform numbers a sample
+# How far afield samples are sought
+STRAIGHT_ON = 0
+CAREFUL = 1  # also short steps around the vehicle
+ANY_MEDIUM = 2  # also crossings that the mission does not need: the way out of a pocket may lead through them
 _GOAL_EXTENSION = 60  # edges: a try at the goal may go all the way
 _AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
 _AROUND_SHARE = 0.7
 _ROAM_HEIGHT = 1.5  # m
+_NEAR = 2.0  # m
+_CAREFUL_SHARE = 0.3  # of the usual step: slow enough to leave a gap that is hardly wider than the vehicle
 _OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it bounds from below what a path may cost
 _WALL = 0.5  # m: samples keep this far from the walls
 _AIR_REACHED = 0.4  # m
@@ -46,6 +52,15 @@ def draw_point(draws, k, root, goal, air, model):
 
 
 @inlined
+def draw_near(draws, k, root):
+    """Sample a point around the root, in its medium: for the way out of a narrow place."""
+    x = root.state[0] + between(draws[k + 3], -_NEAR, _NEAR)
+    y = root.state[1] + between(draws[k + 4], -_NEAR, _NEAR)
+    z = root.state[2] + between(draws[k + 5], -_NEAR, _NEAR)
+    return x, y, max(z, AIR_GATE) if root.state[2] > 0.0 else min(z, -WATER_GATE)
+
+
+@inlined
 def draw_column(draws, k, root, goal, roam, settings, model):
     """Sample a crossing column near the water-side end; the point lies at the goal's height on the far side.
 
@@ -53,7 +68,7 @@ def draw_column(draws, k, root, goal, roam, settings, model):
     """
     w = model.world
     from_air = root.state[2] > 0.0
-    at_goal = from_air and roam == 0
+    at_goal = from_air and roam != ANY_MEDIUM
     cx = goal[0] if at_goal else root.state[0]
     cy = goal[1] if at_goal else root.state[1]
     sine, cosine = sincos(between(draws[k + 3], -np.pi, np.pi))
@@ -61,7 +76,7 @@ def draw_column(draws, k, root, goal, roam, settings, model):
     x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
     y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
     z = -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT
-    return x, y, z if roam else goal[2]
+    return x, y, z if roam == ANY_MEDIUM else goal[2]
 
 
 @inlined
@@ -88,7 +103,7 @@ def next_node(work, size, x, y, z, to_goal, from_air, by_cost, stamp, objective)
 
 
 @routine
-def extend(work, values, goal, source, size, x, y, z, limit, settings, objective, margin, ticks):
+def extend(work, values, goal, source, size, x, y, z, limit, step, objective, margin, ticks):
     """Connect a node to a sample by edges of one period, crossing if the media differ (Alg. 1, lines 3-17).
 
     Returns the new size. Nodes of an extension that runs into something are kept and marked unsafe.
@@ -129,7 +144,7 @@ def extend(work, values, goal, source, size, x, y, z, limit, settings, objective
                 break
         if air:
             psi = facing(aim_x, aim_y, goal[0], goal[1], node.reference[3]) if goal[2] < 0.0 else node.reference[3]
-            rx, ry, rz, psi = air_reference(node, aim_x, aim_y, aim_z, psi, model, settings.step, period)
+            rx, ry, rz, psi = air_reference(node, aim_x, aim_y, aim_z, psi, model, step, period)
         else:
             rx, ry, rz, psi = water_reference(node, aim_x, aim_y, aim_z, speeds, model, period)
         result, crossed = edge(work, values, goal, current, size, rx, ry, rz, psi, margin, ticks)
@@ -170,13 +185,12 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
         settings: `SettingParams`.
         objective: `ObjectiveParams`.
         margin: clearance in m that edges keep.
-        roam: 1 to try crossings even if root and goal share a medium: the way out of a pocket may lead through the
-            other one.
+        roam: `STRAIGHT_ON`, `CAREFUL` or `ANY_MEDIUM`, the more the longer the vehicle has waited for a path.
         ticks: ticks a period.
     """
     model = unpack_model(values)
     root = work.nodes[0]
-    change = roam != 0 or (root.state[2] > 0.0) != (goal[2] > 0.0)
+    change = roam == ANY_MEDIUM or (root.state[2] > 0.0) != (goal[2] > 0.0)
     for i in range(work.path.size):
         work.path[i] = -1
     paper = objective.paper > 0.0
@@ -185,7 +199,7 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
         k = iteration * DRAWS
         kind, by_cost = draws[k], draws[k + 1] < 0.5 and not paper
         to_goal = kind < settings.goal_bias
-        column = not to_goal and (roam != 0 or (change and not paper))
+        column = not to_goal and (roam == ANY_MEDIUM or (change and not paper))
         column = column and kind < settings.goal_bias + settings.column_bias
         if to_goal:
             x, y, z = goal[0], goal[1], goal[2]
@@ -198,6 +212,11 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
             x, y, z = draw_point(draws, k, root, goal, air, model)
             # as printed, a sample in the other medium is reached through the surface where the line meets it
             from_air = root.state[2] > 0.0 if paper else air
+        careful = roam != STRAIGHT_ON and not to_goal and not column and draws[k + 2] < 0.5
+        if careful:
+            x, y, z = draw_near(draws, k, root)
+            from_air = root.state[2] > 0.0
+        step = _CAREFUL_SHARE * settings.step if careful else settings.step
         beyond = cost_to_go(x, y, z, goal[0], goal[1], goal[2], objective)
         for _ in range(settings.tries):
             i = next_node(work, size, x, y, z, to_goal, from_air, by_cost, iteration, objective)
@@ -211,7 +230,7 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
             if n.cost + _OPTIMISM * via >= best:
                 continue
             limit = _GOAL_EXTENSION if to_goal else settings.extension
-            grown = extend(work, values, goal, i, size, x, y, z, limit, settings, objective, margin, ticks)
+            grown = extend(work, values, goal, i, size, x, y, z, limit, step, objective, margin, ticks)
             if grown > size:
                 size = grown
                 if work.nodes[size - 1].goal and settings.prune > 0.0:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym.simulation.simulation import Simulation, row_at
 from planners.cl_rrt.execute import cycle
-from planners.cl_rrt.expand import DRAWS
+from planners.cl_rrt.expand import ANY_MEDIUM, CAREFUL, DRAWS, STRAIGHT_ON
 from planners.cl_rrt.memory import Memory, Report, first_memory
 from planners.cl_rrt.objective import objective_params
 from planners.cl_rrt.settings import CLRRTSettings
@@ -19,7 +19,7 @@ from planners.policy import Known, Observation, PlannerPolicy, known, simulation
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
-_PATIENCE = 8  # cycles without a path before crossings are tried that the mission does not need
+_CAREFUL_AFTER, _ANY_MEDIUM_AFTER = 2, 8  # cycles without a path before samples are sought further afield
 
 
 class TreeView(NamedTuple):
@@ -149,7 +149,8 @@ class CLRRT(PlannerPolicy):
         root = memory.root
         if root >= 0 and np.abs(memory.nodes["state"][root][:3] - start.state[:3]).max() > _MOVED:
             root = -1
-        roam = int(memory.waiting >= _PATIENCE)
+        waiting = memory.waiting
+        roam = STRAIGHT_ON if waiting < _CAREFUL_AFTER else CAREFUL if waiting < _ANY_MEDIUM_AFTER else ANY_MEDIUM
         size, begin, done = memory.size, True, False
         while not done:
             if self.time_budget is None:

@@ -4,13 +4,14 @@ import dataclasses
 import itertools
 import pickle
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from hydrone_gym import HYDRONE, Outcome, Scenario
+from hydrone_gym import HYDRONE, Outcome, Scenario, load_scenario
 from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, generate
 from hydrone_gym.world.world import World
@@ -172,6 +173,15 @@ def test_hard_worlds_end_without_contact(name):
     _, info = fly(env, CLRRT.for_env(env), scenario=empty_scenario(start, goal, obstacles))
     assert info["clearance"] > 0.0
     assert info["outcome"] is (Outcome.GOAL if solvable else Outcome.TIMEOUT)
+
+
+def test_leaves_a_gap_hardly_wider_than_the_vehicle():
+    """World 670 of the dense Experiment 1: it stops 3 cm from a sphere, where every usual step is blocked."""
+    env = make("AirToWater", num_obstacles=40)
+    scenario = load_scenario(Path(__file__).with_name("narrow_gap.json"))
+    _, info = fly(env, CLRRT.for_env(env), scenario=scenario)
+    assert info["outcome"] is Outcome.GOAL
+    assert info["clearance"] > 0.0
 
 
 @pytest.mark.parametrize("objective", ["energy", "length", "paper"])

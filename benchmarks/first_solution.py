@@ -1,0 +1,240 @@
+"""Time from an empty tree to the first path to the goal in a known map: CL-RRT, and OMPL's control RRT beside it.
+
+    python -m benchmarks.first_solution                      # 300 worlds a set, OMPL in the first 30 of each
+    python -m benchmarks.first_solution --worlds 50 --ompl 0 # without OMPL
+
+World k of a set is drawn from seed k, and every sphere of it is known. CL-RRT grows one sample at a time until a node
+lies at the goal; no path is chosen, verified or sent. OMPL plans in the same worlds with the same edge (one period of
+the kernel, the same clearance and crossing limits), a moment after CL-RRT did. It gets an environment of its own,
+filled by pip on the first run; `peers/ompl_worker.py` says what its Python interface allows.
+"""
+
+import dataclasses
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import tyro
+
+from benchmarks.peers.ompl_run import OmplWorker, Planned
+from benchmarks.peers.run import default_cache
+from benchmarks.planning import DENSITIES, SETS, law_of
+from benchmarks.tables import Sheet, number
+from benchmarks.timing import save
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.generator import generate
+from hydrone_gym.world.scenario import Scenario
+from hydrone_gym.world.world import World
+from planners.cl_rrt.execute import cycle
+from planners.cl_rrt.expand import DRAWS
+from planners.cl_rrt.memory import first_memory
+from planners.cl_rrt.objective import objective_params
+from planners.cl_rrt.settings import CLRRTSettings
+from planners.cl_rrt.stopping import safe_speed
+from planners.cl_rrt.tree import new_workspace
+
+PERIOD = 0.5  # s
+SAMPLES = 1  # between looks at the tree
+FULL = 0.8  # share of the tree's capacity at which it is cut back, as a new cycle would
+WARM_UPS = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What to plan."""
+
+    worlds: int = 300
+    """Worlds a set."""
+    sets: tuple[str, ...] = ("experiment-1", "experiment-2")
+    """Mission types, named as in benchmarks.planning."""
+    density: tuple[int, ...] = tuple(DENSITIES)
+    """Numbers of spheres."""
+    vehicle: Literal["paper", "physical"] = "paper"
+    """Parameter set."""
+    objective: Literal["time", "energy", "length", "paper"] = "time"
+    """What the planner minimises."""
+    ompl: int = 30
+    """Worlds of each set in which OMPL plans too."""
+    limit: float = 1.0
+    """Seconds of wall-clock time before a world counts as not solved."""
+    cache: Path = field(default_factory=default_cache)
+    """Where OMPL's environment is kept."""
+
+
+class Grower:
+    """CL-RRT's growth alone: from an empty tree to the first node at the goal."""
+
+    def __init__(self, a: Settings) -> None:
+        """Make the planner's parameters."""
+        self._simulation = Simulation(named_vehicle(a.vehicle), World(), PERIOD)
+        self._settings = CLRRTSettings()
+        self._params = self._settings.params(safe_speed(self._simulation, 1) * PERIOD, prune=a.objective != "paper")
+        self._objective = objective_params(self._simulation, a.objective)
+        self._limit = a.limit
+
+    def plan(self, row: np.ndarray, scenario: Scenario, seed: int) -> Planned:
+        """Grow until the goal is reached; the time includes the storage of the tree."""
+        obstacles, goal = np.array(scenario.obstacles), np.array(scenario.goal)
+        wall, cpu = time.perf_counter(), time.process_time()
+        random = np.random.Generator(np.random.Philox(key=seed))
+        memory = first_memory(self._settings.max_nodes, row[16:])
+        work = new_workspace(memory.nodes, obstacles, memory.backup)
+        ends, dead = work.nodes["goal"], work.nodes["dead"]
+        size, root, begin, solved = 0, -1, True, False
+        while not solved and time.perf_counter() - wall < self._limit:
+            before = 0 if begin else size
+            size = cycle(
+                work,
+                self._simulation.values,
+                goal,
+                row,
+                row[:3],
+                size,
+                root,
+                len(obstacles),
+                random.random(SAMPLES * DRAWS),
+                SAMPLES,
+                self._params,
+                self._objective,
+                0,
+                self._simulation.ticks,
+                begin,
+                False,
+            )[0]
+            root, begin = 0, size > FULL * self._settings.max_nodes
+            solved = bool((ends[before:size] > dead[before:size]).any())
+        return Planned(solved, time.perf_counter() - wall, time.process_time() - cpu, int(work.edges[0]))
+
+
+def start_row(scenario: Scenario) -> np.ndarray:
+    """A vehicle at rest: state, controller memory, reference, (20,)."""
+    x, y, z, yaw = scenario.start
+    row = np.zeros(20)
+    row[:3], row[5], row[16:] = (x, y, z), yaw, (x, y, z, yaw)
+    return row
+
+
+def summary(planned: list[Planned], limit: float) -> dict[str, Any]:
+    """Figures of a set; a world that was not solved counts as infinitely long."""
+    wall, cpu = ([getattr(p, clock) if p.solved else np.inf for p in planned] for clock in ("wall", "cpu"))
+    figures: dict[str, Any] = {"worlds": len(planned), "limit_s": limit, "solved": sum(p.solved for p in planned)}
+    for clock, values in (("wall", wall), ("cpu", cpu)):
+        for name, share in (("median", 0.5), ("p99", 0.99)):
+            value = float(np.quantile(values, share, method="higher"))
+            figures[f"{clock}_{name}_ms"] = 1e3 * value if np.isfinite(value) else None
+    edges = [p.edges for p in planned]
+    figures["edges_median"] = float(np.median(edges))
+    figures["edges_per_cpu_second"] = sum(edges) / sum(p.cpu for p in planned)
+    figures["edges_per_second"] = sum(edges) / sum(p.wall for p in planned)
+    return figures
+
+
+def compare(ours: list[Planned], theirs: list[Planned], limit: float) -> dict[str, Any]:
+    """OMPL's figures and CL-RRT's in the same worlds; where OMPL's median is beyond the limit, a lower bound."""
+    found = {"OMPL": summary(theirs, limit), "CL-RRT": summary(ours[: len(theirs)], limit)}
+    for clock in ("wall", "cpu"):
+        slow, fast = (found[name][f"{clock}_median_ms"] for name in ("OMPL", "CL-RRT"))
+        found[f"{clock}_ratio"] = (1e3 * limit if slow is None else slow) / fast
+        found[f"{clock}_ratio_is_bound"] = slow is None
+    return found
+
+
+def run_set(name: str, density: int, a: Settings, grower: Grower, worker: OmplWorker | None) -> dict[str, Any]:
+    """Plan in the worlds of a set, in turns."""
+    law, radius = law_of(name, density), named_vehicle(a.vehicle).radius
+    ours, theirs = [], []
+    for seed in range(a.worlds):
+        scenario = generate(law, World(), radius, np.random.default_rng(seed))
+        row = start_row(scenario)
+        ours.append(grower.plan(row, scenario, seed))
+        if worker is not None and seed < a.ompl:
+            theirs.append(worker.plan(row, scenario, a.limit))
+    figures = summary(ours, a.limit)
+    figures["unsolved"] = [seed for seed, p in enumerate(ours) if not p.solved]
+    return {**figures, "beside_ompl": compare(ours, theirs, a.limit)} if theirs else figures
+
+
+def cells(figures: dict[str, Any]) -> tuple[str, ...]:
+    """Numbers of a row."""
+    times = []
+    for clock in ("wall", "cpu"):
+        found = (figures[f"{clock}_{name}_ms"] for name in ("median", "p99"))
+        words = (f"> {1e3 * figures['limit_s']:.0f}" if value is None else number(value) for value in found)
+        times.append(" / ".join(words))
+    share = f"{figures['solved']}/{figures['worlds']}"
+    rates = (number(figures["edges_per_second"]), number(figures["edges_per_cpu_second"]))
+    return (share, *times, number(figures["edges_median"]), *rates)
+
+
+def sheet(measured: dict[str, Any]) -> Sheet:
+    """The table: every set, then both planners in the worlds they share."""
+    rows, notes = [], []
+    for name, figures in measured["sets"].items():
+        rows.append((f"CL-RRT, {name}", *cells(figures), "–"))
+        if "beside_ompl" in figures:
+            beside = figures["beside_ompl"]
+            least = "≥ " if beside["wall_ratio_is_bound"] else ""
+            rows.append((f"CL-RRT, {name}, OMPL's worlds", *cells(beside["CL-RRT"]), "1"))
+            ratio = f"{least}{beside['wall_ratio']:.0f}"
+            rows.append((f"OMPL {measured['ompl']} RRT, {name}", *cells(beside["OMPL"]), ratio))
+    if "ompl_missing" in measured:
+        notes.append(f"OMPL: not measured ({measured['ompl_missing'].splitlines()[0]}).")
+    columns = (
+        "planner, set",
+        "solved",
+        "wall ms, median / p99",
+        "CPU ms, median / p99",
+        "edges, median",
+        "edges/s",
+        "edges/CPU s",
+        "wall median / CL-RRT's",
+    )
+    return Sheet("First solution in a known map", columns, rows, notes)
+
+
+def start_ompl(a: Settings, measured: dict[str, Any]) -> OmplWorker | None:
+    """Start OMPL if it is wanted and can be had; say so in `measured`."""
+    if a.ompl < 1:
+        return None
+    try:
+        worker = OmplWorker(a.vehicle, PERIOD, a.cache.resolve())
+    except (OSError, RuntimeError) as error:
+        measured["ompl_missing"] = str(error)
+        print(f"OMPL: not measured.\n{error}", file=sys.stderr)
+        return None
+    measured["ompl"] = worker.version
+    return worker
+
+
+def main(a: Settings) -> None:
+    """Plan, print the table and save the figures."""
+    for name in a.sets:
+        if name not in SETS:
+            raise SystemExit(f"--sets must be among {', '.join(SETS)}, got {name!r}")
+    for density in a.density:
+        if density not in DENSITIES:
+            raise SystemExit(f"--density must be among {', '.join(map(str, DENSITIES))}, got {density}")
+    if a.worlds < 1 or not a.limit > 0.0:
+        raise SystemExit(f"--worlds and --limit must be positive, got {a.worlds} and {a.limit}")
+    measured: dict[str, Any] = {"sets": {}}
+    worker = start_ompl(a, measured)
+    grower = Grower(a)
+    try:
+        warm = dataclasses.replace(a, worlds=WARM_UPS, ompl=2)
+        run_set(a.sets[0], a.density[0], warm, grower, worker)
+        for density in a.density:
+            for name in a.sets:
+                measured["sets"][f"{name}, {density} spheres"] = run_set(name, density, a, grower, worker)
+    finally:
+        if worker is not None:
+            worker.close()
+    save("first_solution", " ".join(["python -m benchmarks.first_solution", *sys.argv[1:]]), {"measured": measured})
+    print(sheet(measured).markdown())
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings, description=__doc__))
