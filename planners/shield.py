@@ -60,7 +60,7 @@ class Shield:
         """Make the working storage."""
         self.policy = policy
         self.simulation = simulation
-        self._block, self._scratch = new_block(1), new_rows(1)
+        self._block, self._scratch = new_block(1), new_rows(2)
         self._log = np.zeros((1, LOGGED_CROSSINGS, len(CROSSING_FIELDS)))
         world = simulation.world
         self._low = np.array([*world.lower, -np.pi], np.float32).astype(np.float64)

@@ -9,16 +9,16 @@ from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rows import load_row, store_row
 from hydrone_gym.world.obstacles import swept_distance
-from planners.cl_rrt.references import hover_reference, inside
+from planners.cl_rrt.references import AIR_GATE, WATER_GATE, hover_reference, inside
 
 HELD = -1  # choice: no candidate was safe, the hover verified last goes on
-MARGIN = 0.03  # m of clearance that checked motion keeps
-LOOK_AHEAD = 9  # periods that a hover is simulated for
+MARGIN = 0.05  # m of clearance that checked motion keeps
+LOOK_AHEAD = 12  # periods that a hover is simulated for
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
 _DRIFT = 12.0  # s: what is left of sway at the end of a stop in water goes on for a while
-_GIVE = 0.02  # m: how much nearer than now a vehicle within the margin may come
-_LEAST = 0.005  # m
+_GIVE = 0.002  # m: how much nearer than now a vehicle within the margin may come; more would add up
+_LEAST = 0.001  # m
 
 
 @routine
@@ -82,33 +82,56 @@ def _single(value):
     return float(np.float32(value))
 
 
-@routine
-def _verify(row, scratch, rx, ry, rz, psi, hover, spheres, closest, count, margin, ticks, model, block, log):
-    """Whether a reference can be followed to rest; writes the hover that does it to `hover` (4,)."""
-    eye = row.state
+@inlined
+def _copy(source, destination):
+    """Copy what a stop begins from, field by field: record assignment compiles slowly."""
     for c in range(12):
-        scratch.state[c] = row.state[c]
+        destination.state[c] = source.state[c]
     for c in range(4):
-        scratch.integral[c], scratch.reference[c] = row.integral[c], row.reference[c]
+        destination.integral[c], destination.reference[c] = source.integral[c], source.reference[c]
     for c in range(3):
-        scratch.goal[c] = row.goal[c]
-    safe, arrives = _follow(scratch, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, model, block, log)
-    s = scratch.state
-    hx, hy, hz, heading = hover_reference(scratch, model)
-    hover[0], hover[1], hover[2], hover[3] = _single(hx), _single(hy), _single(hz), _single(heading)
+        destination.goal[c] = source.goal[c]
+
+
+@routine
+def _rests(row, eye, hover, spheres, closest, count, margin, ticks, model, block, log):
+    """Whether a row comes to rest safely at a hover reference (4,); the row is changed in place."""
+    s = row.state
     for _ in range(LOOK_AHEAD):
-        if not safe or arrives:
-            return safe
         if abs(s[2]) > model.world.zone and s[6] * s[6] + s[7] * s[7] + s[8] * s[8] < _REST * _REST:
             break
         hx, hy, hz, heading = hover[0], hover[1], hover[2], hover[3]
         safe, arrives = _follow(
-            scratch, eye, hx, hy, hz, heading, spheres, closest, count, margin, ticks, model, block, log
+            row, eye, hx, hy, hz, heading, spheres, closest, count, margin, ticks, model, block, log
         )
-    if safe and s[2] < 0.0:
+        if arrives or not safe:
+            return safe
+    if s[2] < 0.0:
         x, y = s[0] + _DRIFT * s[6], s[1] + _DRIFT * s[7]
         return _clearance(s[0], s[1], s[2], x, y, s[2], spheres, count, model.vehicle.radius) >= margin
-    return safe
+    return True
+
+
+@routine
+def _verify(row, scratch, rx, ry, rz, psi, hover, spheres, closest, count, margin, ticks, model, block, log):
+    """Whether a reference can be followed to rest; writes the hover that does it to `hover` (4,).
+
+    Near the surface there are two ways to stop: go back to the side one is on, or finish the crossing.
+    """
+    eye, end, spare = row.state, scratch[0], scratch[1]
+    _copy(row, end)
+    safe, arrives = _follow(end, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, model, block, log)
+    hx, hy, hz, heading = hover_reference(end, model)
+    hover[0], hover[1], hover[2], hover[3] = _single(hx), _single(hy), _single(hz), _single(heading)
+    if arrives or not safe:
+        return safe
+    _copy(end, spare)
+    if _rests(spare, eye, hover, spheres, closest, count, margin, ticks, model, block, log):
+        return True
+    if abs(end.state[2]) > AIR_GATE:
+        return False
+    hover[2] = _single(AIR_GATE if hz < 0.0 else -WATER_GATE)
+    return _rests(end, eye, hover, spheres, closest, count, margin, ticks, model, block, log)
 
 
 @kernel
@@ -122,14 +145,14 @@ def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, 
         spheres: (n, 4 M) known spheres, unused ones far away.
         values: packed `Model`.
         ticks: of a period.
-        scratch: (1,) dtype `ROW`.
+        scratch: (2,) dtype `ROW`.
         closest: (M,) working storage; block, log: that of one lane.
         sent: (n, 4) references to fly, written.
         held: (n, 4) hovers verified last, updated.
         choice: (n,) 0: as proposed, k: candidate k, HELD; written.
     """
     model = unpack_model(values)
-    w, spare = model.world, scratch[0]
+    w = model.world
     hover, near = np.empty(4), np.empty(spheres.shape[1])
     for n in range(rows.size):
         row, s = rows[n], rows[n].state
@@ -147,7 +170,7 @@ def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, 
                 ry = inside(s[1] + scale * (sine * dx + cosine * dy), w.y_min, w.y_max)
                 rz = inside(s[2] + scale * dz + lift, w.z_min, w.z_max)
             rx, ry, rz, psi = _single(rx), _single(ry), _single(rz), _single(psi)
-            if _verify(row, spare, rx, ry, rz, psi, hover, near, closest, count, margin, ticks, model, block, log):
+            if _verify(row, scratch, rx, ry, rz, psi, hover, near, closest, count, margin, ticks, model, block, log):
                 choice[n] = k
                 sent[n, 0], sent[n, 1], sent[n, 2], sent[n, 3] = rx, ry, rz, psi
                 for c in range(4):

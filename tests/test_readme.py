@@ -18,7 +18,7 @@ def blocks(language):
 
 def test_python_blocks_run_in_order(capsys):
     code = blocks("python")
-    assert len(code) == 4
+    assert len(code) == 5
     names = {}
     for block in code:
         exec(compile(block, "README.md", "exec"), names)

@@ -30,7 +30,6 @@ POSITION = 3
 REST = 9 + 4 + 4 + 1  # the other states, controller memory, reference in force, 1 if the edge was free
 WIDE = 1e4  # bounds of what is not sampled for a purpose
 STEP = (1.0, 1.0, 1.0, 0.5)  # a control: how far a period moves the reference from the vehicle at most, m, m, m, rad
-PERIODS = (1, 10)  # a control is held for
 
 
 def bounds(low: Any, high: Any) -> base.RealVectorBounds:
@@ -99,13 +98,15 @@ def solve(simulation: Simulation, request: dict[str, Any]) -> dict[str, Any]:
     setup.setStateValidityChecker(is_valid)
     information = setup.getSpaceInformation()
     information.setPropagationStepSize(simulation.period)
-    information.setMinMaxControlDuration(*PERIODS)
+    information.setMinMaxControlDuration(1, request["longest"])
     start, goal = states.allocState(), states.allocState()
     row = request["row"]
     start[0][0:POSITION], start[1][0:REST] = row[:POSITION], [*row[POSITION:], 1.0]
     goal[0][0:POSITION], goal[1][0:REST] = request["goal"], [0.0] * (REST - 1) + [1.0]
     setup.setStartAndGoalStates(start, goal, world.goal_radius)
-    setup.setPlanner(control.RRT(information))
+    planner = control.RRT(information)
+    planner.setGoalBias(request["goal_bias"])
+    setup.setPlanner(planner)
     setup.setup()
     wall, cpu = time.perf_counter(), time.process_time()
     setup.solve(request["limit"])
