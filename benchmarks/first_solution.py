@@ -180,18 +180,17 @@ def sheet(measured: dict[str, Any]) -> Sheet:
     """The table: every set, then both planners in the worlds they share."""
     rows, notes = [], []
     for name, figures in measured["sets"].items():
-        rows.append((f"CL-RRT, {name}", *cells(figures), "–"))
+        rows.append((f"CL-RRT; {name}", *cells(figures), "–"))
         if "ompl" in figures:
-            rows.append((f"CL-RRT, {name}, OMPL's worlds", *cells(figures["same_worlds"]), "1"))
+            rows.append((f"CL-RRT; {name}, OMPL's worlds", *cells(figures["same_worlds"]), "1"))
         for tuning, theirs in figures.get("ompl", {}).items():
             ratio = f"{'≥ ' if theirs['wall_ratio_is_bound'] else ''}{theirs['wall_ratio']:.0f}"
-            rows.append((f"OMPL {measured['ompl']} RRT {tuning}, {name}", *cells(theirs), ratio))
+            rows.append((f"OMPL {measured['ompl']} RRT, {tuning}; {name}", *cells(theirs), ratio))
     if "ompl" in measured:
-        words = (
-            f"{name}: goal bias {t.goal_bias}, controls held 1 to {t.longest} periods" for name, t in TUNINGS.items()
-        )
+        held = "; ".join(f"{name}: {t.goal_bias}, 1 to {t.longest}" for name, t in TUNINGS.items())
         notes.append(
-            f"OMPL {'; '.join(words)}. Edges are propagations over one period, blocked ones included, for both planners."
+            "Edges are propagations over one period, blocked ones included. OMPL's medians are of few worlds "
+            f"and vary between runs. Its goal bias, and periods a control is held for: {held}."
         )
     if "ompl_missing" in measured:
         notes.append(f"OMPL: not measured ({measured['ompl_missing'].splitlines()[0]}).")
@@ -232,7 +231,8 @@ def main(a: Settings) -> None:
             raise SystemExit(f"--density must be among {', '.join(map(str, DENSITIES))}, got {density}")
     if a.worlds < 1 or not a.limit > 0.0:
         raise SystemExit(f"--worlds and --limit must be positive, got {a.worlds} and {a.limit}")
-    measured: dict[str, Any] = {"sets": {}}
+    arguments = {key: value for key, value in dataclasses.asdict(a).items() if key != "cache"}
+    measured: dict[str, Any] = {"arguments": arguments, "sets": {}}
     worker = start_ompl(a, measured)
     grower = Grower(a)
     try:
@@ -244,7 +244,7 @@ def main(a: Settings) -> None:
     finally:
         if worker is not None:
             worker.close()
-    save("first_solution", " ".join(["python -m benchmarks.first_solution", *sys.argv[1:]]), {"measured": measured})
+    save("first_solution", "python -m benchmarks.first_solution", {"measured": measured})
     print(sheet(measured).markdown())
 
 

@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents import load_agent, shipped_agents
 from agents.activation import Tanh
+from agents.agent import PRETRAINED
 from agents.agent_file import TENSORS, TEXT, AgentFile, read_agent, save_agent
 from agents.evaluation import MISSIONS, evaluate
 from agents.export import export_agent
@@ -173,3 +174,12 @@ def test_bad_observations(folder):
         agent.predict({"state": np.zeros(12)})
     with pytest.raises(TypeError, match="HyDrone"):
         load_agent(folder, env=gym.make("CartPole-v1"))
+
+
+@pytest.mark.parametrize("name", shipped_agents())
+def test_shipped_agents(name):
+    """Each is small, has a card, and arrives in most of a few held-out worlds."""
+    folder = PRETRAINED / name
+    assert sum(file.stat().st_size for file in folder.iterdir()) < 2_000_000
+    assert "## Success on held-out worlds" in (folder / "README.md").read_text(encoding="utf-8")
+    assert evaluate(load_agent(name), ID, episodes=100).success > 0.9
