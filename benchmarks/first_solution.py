@@ -190,7 +190,7 @@ def sheet(measured: dict[str, Any]) -> Sheet:
         held = "; ".join(f"{name}: {t.goal_bias}, 1 to {t.longest}" for name, t in TUNINGS.items())
         notes.append(
             "Edges are propagations over one period, blocked ones included. OMPL's medians are of few worlds "
-            f"and vary between runs. Its goal bias, and periods a control is held for: {held}."
+            f"and one random stream. Its goal bias, and periods a control is held for: {held}."
         )
     if "ompl_missing" in measured:
         notes.append(f"OMPL: not measured ({measured['ompl_missing'].splitlines()[0]}).")

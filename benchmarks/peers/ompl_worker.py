@@ -9,6 +9,7 @@ one's own, SST and PDST (none of these classes has a constructor in Python). Con
 """
 
 import json
+import os
 import sys
 import time
 from importlib.metadata import version
@@ -18,7 +19,6 @@ import numpy as np
 from ompl import base, control, util
 
 from benchmarks.edges import propagate_edges
-from benchmarks.peers.protocol import begin
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.world import World
@@ -116,7 +116,9 @@ def solve(simulation: Simulation, request: dict[str, Any]) -> dict[str, Any]:
 
 def main() -> None:
     """Answer one line for each world, after a first line with the version."""
-    answers = begin()
+    # what a library prints goes to standard error; not tied to one core, as CL-RRT is not
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(1)  # of the whole process; the planners offer none of their own
     simulation = Simulation(named_vehicle(sys.argv[1]), World(), float(sys.argv[2]))
