@@ -45,37 +45,10 @@ def take_root(work, size, goal, objective, now, root):
 
 
 @inlined
-def prune_blocked(work, size, known_before, radius, margin):
-    """Kill the edges that obstacles detected since the last cycle stand in the way of (Alg. 2, line 16)."""
-    count = work.closest.size
-    if known_before >= count:
-        return
-    for i in range(1, size):
-        a, b = work.nodes[work.nodes[i].parent].state, work.nodes[i].state
-        for j in range(known_before, count):
-            o = 4 * j
-            distance = swept_distance(
-                a[0],
-                a[1],
-                a[2],
-                b[0],
-                b[1],
-                b[2],
-                work.obstacles[o],
-                work.obstacles[o + 1],
-                work.obstacles[o + 2],
-                work.obstacles[o + 3],
-            )
-            if distance - radius < margin - _BEND:
-                work.nodes[i].dead = 1
-    prune_orphans(work.nodes, size)
-
-
-@inlined
-def clearance_between(work, a, b, radius):
-    """Least clearance (m) of the straight path between two points from every known obstacle."""
+def clearance_between(work, a, b, first, radius):
+    """Least clearance (m) of the straight path between two points from the known obstacles, from the first given on."""
     least = np.inf
-    for j in range(work.closest.size):
+    for j in range(first, work.closest.size):
         o = 4 * j
         distance = swept_distance(
             a[0],
@@ -94,13 +67,26 @@ def clearance_between(work, a, b, radius):
 
 
 @inlined
+def prune_blocked(work, size, known_before, radius, margin):
+    """Kill the edges that obstacles detected since the last cycle stand in the way of (Alg. 2, line 16)."""
+    count = work.closest.size
+    if known_before >= count:
+        return
+    for i in range(1, size):
+        a, b = work.nodes[work.nodes[i].parent].state, work.nodes[i].state
+        if clearance_between(work, a, b, known_before, radius) < margin - _BEND:
+            work.nodes[i].dead = 1
+    prune_orphans(work.nodes, size)
+
+
+@inlined
 def margin_here(work, radius, settings):
     """The margin edges keep this cycle: the full one, or what a vehicle already nearer to an obstacle has left.
 
     Without this a vehicle that drifted or stopped within the margin could never move again.
     """
     state = work.nodes[0].state
-    left = clearance_between(work, state, state, radius) - _GIVE
+    left = clearance_between(work, state, state, 0, radius) - _GIVE
     return max(min(settings.margin, left), _LEAST_MARGIN)
 
 
@@ -203,7 +189,7 @@ def verify_stop(work, values, goal, eye, first, settings, margin, ticks, model, 
     end = work.nodes[scratch].state
     if end[2] < 0.0:
         drifted = (end[0] + _DRIFT_TIME * end[6], end[1] + _DRIFT_TIME * end[7], end[2])
-        if clearance_between(work, end, drifted, model.vehicle.radius) < margin:
+        if clearance_between(work, end, drifted, 0, model.vehicle.radius) < margin:
             return 0
     for c in range(4):
         work.backup[count, c] = work.nodes[scratch].reference[c]
