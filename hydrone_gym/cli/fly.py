@@ -1,14 +1,10 @@
-"""The command `hydrone`: one class a subcommand, its fields are the options and `run` returns the exit code.
-
-Exit codes: 0 success, 1 a mission that did not end at the goal, 2 bad input, told in one line.
-"""
+"""The subcommand `hydrone fly`: the paper's experiments, a table and figures."""
 
 import itertools
 import json
 import math
-import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +12,7 @@ from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
-import tyro
 
-from agents.train_command import Train
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
@@ -228,21 +222,3 @@ def _cells(record: dict[str, Any]) -> dict[str, str]:
         "planning p50 (ms)": f"{record['planning_ms']['p50']:.2f}",
         "planning p99 (ms)": f"{record['planning_ms']['p99']:.2f}",
     }
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code; `arguments` default to those of the process."""
-    command = tyro.extras.subcommand_cli_from_dict(
-        {"fly": Fly, "train": Train},
-        prog="hydrone",
-        description="Fly the HyDrone in air, through the water surface and below it.",
-        args=arguments,
-        config=(tyro.conf.FlagCreatePairsOff,),
-    )
-    try:
-        code = command.run()
-        sys.stdout.flush()
-    except BrokenPipeError:  # the reader, `head` say, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    return code

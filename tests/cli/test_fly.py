@@ -10,7 +10,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import hydrone_gym.cli as cli
+from hydrone_gym import cli
+from hydrone_gym.cli import fly as fly_module
 from hydrone_gym.evaluation import fly
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario
 from planners import CLRRT
@@ -114,7 +115,7 @@ def test_bad_input_gives_2_and_one_line(options, message, tmp_path, capsys):
     assert cli.main(["fly", "--out", str(tmp_path / "new"), *options]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    (line,) = [line for line in err.splitlines() if line != cli._COMPILING]
+    (line,) = [line for line in err.splitlines() if line != fly_module._COMPILING]
     assert line.startswith("hydrone: error: ")
     assert message in line
     assert not (tmp_path / "new").exists()
@@ -143,16 +144,16 @@ def test_what_the_parser_refuses_gives_2(arguments, capsys):
 def test_compiling_is_announced_only_without_a_cache(tmp_path, monkeypatch, capsys):
     for name in ("advance_rows", "cycle"):
         kernel = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / name)))
-        monkeypatch.setattr(cli, name, kernel)
-    straight, clrrt = cli.Fly(policy="straight"), cli.Fly(policy="clrrt")
+        monkeypatch.setattr(fly_module, name, kernel)
+    straight, clrrt = fly_module.Fly(policy="straight"), fly_module.Fly(policy="clrrt")
     straight._announce_compiling()
-    assert capsys.readouterr().err == f"{cli._COMPILING}\n"
+    assert capsys.readouterr().err == f"{fly_module._COMPILING}\n"
     (tmp_path / "advance_rows").mkdir()
     (tmp_path / "advance_rows" / "kernel.nbi").write_text("")
     straight._announce_compiling()
     assert capsys.readouterr().err == ""
     clrrt._announce_compiling()
-    assert capsys.readouterr().err == f"{cli._COMPILING}\n"
+    assert capsys.readouterr().err == f"{fly_module._COMPILING}\n"
 
 
 def test_the_installed_command(tmp_path):

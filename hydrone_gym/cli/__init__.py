@@ -1,0 +1,31 @@
+"""The command `hydrone`: one module a subcommand, whose class has the options as fields and `run`, the exit code.
+
+Exit codes: 0 success, 1 a mission that did not end at the goal, 2 bad input, told in one line.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+import tyro
+
+from agents.train_command import Train
+from hydrone_gym.cli.fly import Fly
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; `arguments` default to those of the process."""
+    command = tyro.extras.subcommand_cli_from_dict(
+        {"fly": Fly, "train": Train},
+        prog="hydrone",
+        description="Fly the HyDrone in air, through the water surface and below it.",
+        args=arguments,
+        config=(tyro.conf.FlagCreatePairsOff,),
+    )
+    try:
+        code = command.run()
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader, `head` say, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return code
