@@ -38,7 +38,7 @@ from planners.cl_rrt.stopping import safe_speed
 from planners.cl_rrt.tree import new_workspace
 
 PERIOD = 0.5  # s
-SAMPLES = 1  # between looks at the tree
+SAMPLES = 4  # between looks at the tree
 FULL = 0.8  # share of the tree's capacity at which it is cut back, as a new cycle would
 WARM_UPS = 20
 

@@ -52,7 +52,7 @@ class Arguments:
     """Parameter set."""
     objective: Literal["time", "energy", "length", "paper"] = "time"
     """What the planner minimises."""
-    iterations: int = 60
+    iterations: int = 100
     """Samples a cycle."""
     latency: bool = False
     """Use each plan one period after it was begun."""

@@ -55,7 +55,7 @@ class PublishedCLRRT(PlannerPolicy):
         ValueError: a budget or seed out of range.
     """
 
-    def __init__(self, simulation: Simulation, *, iterations: int = 60, seed: int = 0) -> None:
+    def __init__(self, simulation: Simulation, *, iterations: int = 100, seed: int = 0) -> None:
         """Check the budget; settings without margin and with columns all over the box."""
         for name, number, least in (("iterations", iterations, 1), ("seed", seed, 0)):
             if isinstance(number, bool) or not isinstance(number, int) or number < least:
@@ -68,7 +68,7 @@ class PublishedCLRRT(PlannerPolicy):
         self._objective = objective_params(simulation, "paper")
 
     @classmethod
-    def for_env(cls, env: Any, *, iterations: int = 60, seed: int = 0) -> Self:
+    def for_env(cls, env: Any, *, iterations: int = 100, seed: int = 0) -> Self:
         """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
         return cls(simulation_of(env), iterations=iterations, seed=seed)
 

@@ -11,7 +11,7 @@ from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.world.obstacles import swept_distance
+from planners.cl_rrt.clearance import clearance_between
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, inside
 from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING
@@ -20,7 +20,11 @@ _SETTLE_LIMIT = 9.0  # s
 _CROSS_LIMIT = 12.0  # s
 _BEYOND = 1.3  # m: where the reference goes on the other side
 _STOP_TIME = 0.45  # s: stop distance over speed in air
-_STILL = 0.6  # m/s: lateral speed at which a crossing may begin; vertical mode brakes the rest before the surface
+# Lateral and vertical speed (m/s) at which the vehicle may leave the gate
+_STILL_AIR, _LEVEL_AIR = 0.3, 0.3
+_STILL_WATER, _LEVEL_WATER = 1.0, 0.8
+_APART = 0.12  # m from the column: what is left would pull the vehicle sideways inside the zone
+_HEIGHT = 0.2  # m from the gate
 _FACING = 0.15  # rad
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _CLEAR_OF_ZONE = 0.05  # m
@@ -42,23 +46,21 @@ def facing(x, y, to_x, to_y, psi):
 @inlined
 def column_is_free(work, x, y, radius, margin):
     """Whether a vertical path through the zone clears every known obstacle."""
-    for j in range(work.closest.size):
-        o = 4 * j
-        distance = swept_distance(
-            x,
-            y,
-            AIR_GATE,
-            x,
-            y,
-            -WATER_GATE,
-            work.obstacles[o],
-            work.obstacles[o + 1],
-            work.obstacles[o + 2],
-            work.obstacles[o + 3],
-        )
-        if distance - radius < margin:
-            return False
-    return True
+    return clearance_between(work, (x, y, AIR_GATE), (x, y, -WATER_GATE), 0, radius) >= margin
+
+
+@inlined
+def at_gate(state, x, y, gate, psi):
+    """Whether a vehicle may leave the gate in column (x, y): so slow that it moves only vertically inside the zone.
+
+    From below it need not lie still: water brakes it before the zone, and it cannot hold a place sideways anyway.
+    """
+    down = gate > 0.0
+    still, level = (_STILL_AIR, _LEVEL_AIR) if down else (_STILL_WATER, _LEVEL_WATER)
+    slow = state[6] * state[6] + state[7] * state[7] < still * still and abs(state[8]) < level
+    dx, dy = state[0] - x, state[1] - y
+    placed = dx * dx + dy * dy < _APART * _APART and abs(wrap(state[5] - psi)) < _FACING
+    return slow and abs(state[2] - gate) < _HEIGHT and (placed or not down)
 
 
 @routine
@@ -81,9 +83,7 @@ def cross(work, values, goal, source, size, sample_x, sample_y, objective, margi
     current, first = source, size
     settled = False
     for _ in range(int(_SETTLE_LIMIT / period)):
-        n = work.nodes[current].state
-        slow = n[6] * n[6] + n[7] * n[7] < _STILL * _STILL and abs(n[8]) < 0.3
-        settled = slow and abs(n[2] - gate) < 0.2 and (not down or abs(wrap(n[5] - psi)) < _FACING)
+        settled = at_gate(work.nodes[current].state, x, y, gate, psi)
         if settled or size >= work.path.size - 1:
             break
         result, crossed = edge(work, values, goal, current, size, x, y, gate, psi, margin, ticks)

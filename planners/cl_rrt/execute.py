@@ -8,7 +8,7 @@ import numpy as np
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.world.obstacles import swept_distance
+from planners.cl_rrt.clearance import clearance_between
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import cost_to_go
@@ -42,28 +42,6 @@ def take_root(work, size, goal, objective, now, root):
     n.time, n.cost, n.unsafe, n.tried, n.dead = 0.0, 0.0, 0, 0, 0
     n.to_go = cost_to_go(now[0], now[1], now[2], goal[0], goal[1], goal[2], objective)
     return size
-
-
-@inlined
-def clearance_between(work, a, b, first, radius):
-    """Least clearance (m) of the straight path between two points from the known obstacles, from the first given on."""
-    least = np.inf
-    for j in range(first, work.closest.size):
-        o = 4 * j
-        distance = swept_distance(
-            a[0],
-            a[1],
-            a[2],
-            b[0],
-            b[1],
-            b[2],
-            work.obstacles[o],
-            work.obstacles[o + 1],
-            work.obstacles[o + 2],
-            work.obstacles[o + 3],
-        )
-        least = min(least, distance - radius)
-    return least
 
 
 @inlined

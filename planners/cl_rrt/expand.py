@@ -4,13 +4,10 @@ import numpy as np
 
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.simulation.time_to_go import cruise_speeds
-from planners.cl_rrt.crossing import cross, facing
-from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
+from planners.cl_rrt.extend import extend, in_sight
 from planners.cl_rrt.objective import cost_to_go
-from planners.cl_rrt.references import AIR_GATE, WATER_GATE, air_reference, water_reference
+from planners.cl_rrt.references import AIR_GATE, WATER_GATE
 from planners.cl_rrt.tree import OPEN
 
 DRAWS = 6  # uniform numbers a sample
@@ -18,6 +15,11 @@ DRAWS = 6  # uniform numbers a sample
 STRAIGHT_ON = 0
 CAREFUL = 1  # also short steps around the vehicle
 ANY_MEDIUM = 2  # also crossings that the mission does not need: the way out of a pocket may lead through them
+# Kinds of samples
+GOAL_SAMPLE = 0
+COLUMN_SAMPLE = 1
+CAREFUL_SAMPLE = 2  # near the root, with short steps
+POINT_SAMPLE = 3
 _GOAL_EXTENSION = 60  # edges: a try at the goal may go all the way
 _AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
 _AROUND_SHARE = 0.7
@@ -26,8 +28,6 @@ _NEAR = 2.0  # m
 _CAREFUL_SHARE = 0.3  # of the usual step: slow enough to leave a gap that is hardly wider than the vehicle
 _OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it bounds from below what a path may cost
 _WALL = 0.5  # m: samples keep this far from the walls
-_AIR_REACHED = 0.4  # m
-_WATER_REACHED = 0.5  # m: more than the hold radius
 
 
 @inlined
@@ -102,65 +102,6 @@ def next_node(work, size, x, y, z, to_goal, from_air, by_cost, stamp, objective)
     return best
 
 
-@routine
-def extend(work, values, goal, source, size, x, y, z, limit, step, objective, margin, ticks):
-    """Connect a node to a sample by edges of one period, crossing if the media differ (Alg. 1, lines 3-17).
-
-    Returns the new size. Nodes of an extension that runs into something are kept and marked unsafe.
-    """
-    model = unpack_model(values)
-    speeds = cruise_speeds(model)
-    period = ticks * TICK
-    current, first = source, size
-    for _ in range(limit):
-        if size >= work.path.size - 1:
-            break
-        node = work.nodes[current]
-        air = node.state[2] > 0.0
-        change = air != (z > 0.0)
-        aim_z = (AIR_GATE if air else -WATER_GATE) if change else z
-        aim_x, aim_y = x, y
-        if change and objective.paper > 0.0:
-            share = (node.state[2] - aim_z) / (node.state[2] - z)
-            aim_x = node.state[0] + share * (x - node.state[0])
-            aim_y = node.state[1] + share * (y - node.state[1])
-        dx, dy, dz = aim_x - node.state[0], aim_y - node.state[1], aim_z - node.state[2]
-        across2 = dx * dx + dy * dy
-        if change:
-            speed = np.sqrt(node.state[6] * node.state[6] + node.state[7] * node.state[7])
-            near = (0.3 + 0.45 * speed) if air else _WATER_REACHED
-            if across2 < near * near and abs(dz) < 0.7:
-                grown = cross(work, values, goal, current, size, x, y, objective, margin, ticks)
-                if grown == size:
-                    break
-                size = grown
-                current = size - 1
-                if work.nodes[current].goal:
-                    break
-                continue
-        else:
-            near = _AIR_REACHED if air else _WATER_REACHED
-            if across2 + dz * dz < near * near:
-                break
-        if air:
-            psi = facing(aim_x, aim_y, goal[0], goal[1], node.reference[3]) if goal[2] < 0.0 else node.reference[3]
-            rx, ry, rz, psi = air_reference(node, aim_x, aim_y, aim_z, psi, model, step, period)
-        else:
-            rx, ry, rz, psi = water_reference(node, aim_x, aim_y, aim_z, speeds, model, period)
-        result, crossed = edge(work, values, goal, current, size, rx, ry, rz, psi, margin, ticks)
-        if result == BLOCKED or crossed:
-            for i in range(first, size):
-                work.nodes[i].unsafe = 1
-            work.nodes[source].unsafe = 1 if size == first else work.nodes[source].unsafe
-            break
-        adopt(work, goal, objective, current, size, OPEN, result == ARRIVED)
-        current = size
-        size += 1
-        if result == ARRIVED:
-            break
-    return size
-
-
 @inlined
 def least_cost(work, size):
     """Return the least cost of a node at the goal, infinite if there is none."""
@@ -169,6 +110,41 @@ def least_cost(work, size):
         if work.nodes[i].goal and not work.nodes[i].dead:
             least = min(least, work.nodes[i].cost)
     return least
+
+
+@inlined
+def any_beyond(work, size, goal):
+    """Whether the tree has an open node in the goal's medium."""
+    found = False
+    for i in range(size):
+        n = work.nodes[i]
+        found = found or (n.kind == OPEN and not n.dead and (n.state[2] > 0.0) == (goal[2] > 0.0))
+    return found
+
+
+@inlined
+def draw_sample(draws, k, root, goal, roam, onward, settings, objective, model):
+    """Draw what to grow toward (Alg. 1, line 1).
+
+    Returns (x, y, z, whether it is reached from air, kind), the kind `GOAL_SAMPLE`, `COLUMN_SAMPLE`, `CAREFUL_SAMPLE`
+    or `POINT_SAMPLE`. `onward`: the goal's medium is reached, the goal is not, so most samples go there.
+    """
+    paper = objective.paper > 0.0
+    from_air = root.state[2] > 0.0
+    change = roam == ANY_MEDIUM or from_air != (goal[2] > 0.0)
+    if draws[k] < settings.goal_bias:
+        return goal[0], goal[1], goal[2], goal[2] > 0.0, GOAL_SAMPLE
+    columns = change and (roam == ANY_MEDIUM or not paper) and not (onward and draws[k + 2] < 0.5)
+    if columns and draws[k] < settings.goal_bias + settings.column_bias:
+        x, y, z = draw_column(draws, k, root, goal, roam, settings, model)
+        return x, y, z, not z > 0.0, COLUMN_SAMPLE
+    if roam != STRAIGHT_ON and draws[k + 2] < 0.5:
+        x, y, z = draw_near(draws, k, root)
+        return x, y, z, from_air, CAREFUL_SAMPLE
+    air = draws[k + 1] * 2.0 % 1.0 < 0.5 if change and not onward else goal[2] > 0.0
+    x, y, z = draw_point(draws, k, root, goal, air, model)
+    # as printed, a sample in the other medium is reached through the surface where the line meets it
+    return x, y, z, from_air if paper else air, POINT_SAMPLE
 
 
 @routine
@@ -190,34 +166,19 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
     """
     model = unpack_model(values)
     root = work.nodes[0]
-    change = roam == ANY_MEDIUM or (root.state[2] > 0.0) != (goal[2] > 0.0)
     for i in range(work.path.size):
         work.path[i] = -1
     paper = objective.paper > 0.0
-    best = least_cost(work, size) if settings.prune > 0.0 else np.inf
+    best = least_cost(work, size)
+    beyond = any_beyond(work, size, goal)
     for iteration in range(iterations):
         k = iteration * DRAWS
-        kind, by_cost = draws[k], draws[k + 1] < 0.5 and not paper
-        to_goal = kind < settings.goal_bias
-        column = not to_goal and (roam == ANY_MEDIUM or (change and not paper))
-        column = column and kind < settings.goal_bias + settings.column_bias
-        if to_goal:
-            x, y, z = goal[0], goal[1], goal[2]
-            from_air = z > 0.0
-        elif column:
-            x, y, z = draw_column(draws, k, root, goal, roam, settings, model)
-            from_air = not z > 0.0
-        else:
-            air = (goal[2] > 0.0) if not change else draws[k + 1] * 2.0 % 1.0 < 0.5
-            x, y, z = draw_point(draws, k, root, goal, air, model)
-            # as printed, a sample in the other medium is reached through the surface where the line meets it
-            from_air = root.state[2] > 0.0 if paper else air
-        careful = roam != STRAIGHT_ON and not to_goal and not column and draws[k + 2] < 0.5
-        if careful:
-            x, y, z = draw_near(draws, k, root)
-            from_air = root.state[2] > 0.0
-        step = _CAREFUL_SHARE * settings.step if careful else settings.step
-        beyond = cost_to_go(x, y, z, goal[0], goal[1], goal[2], objective)
+        onward = beyond and best == np.inf and not paper
+        x, y, z, from_air, kind = draw_sample(draws, k, root, goal, roam, onward, settings, objective, model)
+        to_goal = kind == GOAL_SAMPLE
+        by_cost = draws[k + 1] < 0.5 and not paper
+        step = _CAREFUL_SHARE * settings.step if kind == CAREFUL_SAMPLE else settings.step
+        left = cost_to_go(x, y, z, goal[0], goal[1], goal[2], objective)
         for _ in range(settings.tries):
             i = next_node(work, size, x, y, z, to_goal, from_air, by_cost, iteration, objective)
             if i < 0:
@@ -226,14 +187,18 @@ def expand_tree(work, values, goal, size, draws, iterations, settings, objective
             n = work.nodes[i]
             n.tried = 1 if to_goal else n.tried
             # a sample that cannot beat the best path, even in an empty world, is not worth an edge
-            via = cost_to_go(n.state[0], n.state[1], n.state[2], x, y, z, objective) + beyond
-            if n.cost + _OPTIMISM * via >= best:
+            via = cost_to_go(n.state[0], n.state[1], n.state[2], x, y, z, objective) + left
+            if settings.prune > 0.0 and n.cost + _OPTIMISM * via >= best:
+                continue
+            seek = kind <= COLUMN_SAMPLE and not paper
+            if seek and not in_sight(work, n, x, y, z, model.vehicle.radius, margin):
                 continue
             limit = _GOAL_EXTENSION if to_goal else settings.extension
             grown = extend(work, values, goal, i, size, x, y, z, limit, step, objective, margin, ticks)
             if grown > size:
                 size = grown
-                if work.nodes[size - 1].goal and settings.prune > 0.0:
-                    best = min(best, work.nodes[size - 1].cost)
+                end = work.nodes[size - 1]
+                best = min(best, end.cost) if end.goal else best
+                beyond = beyond or (end.state[2] > 0.0) == (goal[2] > 0.0)
                 break
     return size

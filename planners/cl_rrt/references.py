@@ -30,8 +30,8 @@ def air_reference(node, gx, gy, gz, psi, model, step, period):
     x, y, z = node.state[0], node.state[1], node.state[2]
     ox, oy, oz = node.reference[0], node.reference[1], node.reference[2]
     dx, dy, dz = gx - ox, gy - oy, gz - oz
-    length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    scale = min(1.0, step / max(length, 1e-9), _CLIMB * period / 0.5 / max(abs(dz), 1e-9))
+    across = np.sqrt(dx * dx + dy * dy)
+    scale = min(1.0, step / max(across, 1e-9), _CLIMB * period / 0.5 / max(abs(dz), 1e-9))
     rx, ry, rz = ox + scale * dx, oy + scale * dy, oz + scale * dz
     lx, ly, lz = rx - x, ry - y, rz - z
     lead = np.sqrt(lx * lx + ly * ly + lz * lz)

@@ -14,7 +14,6 @@ AHEAD_WATER = 0.1  # s
 _DEPTH = 2.5  # m from the surface, clear of the transition zone
 _STOP = 5.0  # s
 _SPARE = 0.1  # m kept between the end of a stop and the edge of sensed space
-_STEP_SHARE = 0.95  # of the speed limit, so that the controller can catch up with its reference
 
 
 def stop_distances(simulation: Simulation, speeds: NDArray[np.float64], *, air: bool) -> NDArray[np.float64]:
@@ -39,7 +38,7 @@ def safe_speed(simulation: Simulation, periods_ahead: int) -> float:
         simulation: vehicle, world and period.
         periods_ahead: periods between sensing and the end of the edge decided on: 1, or 2 with planning latency.
     """
-    limit = _STEP_SHARE * simulation.vehicle.air_gains.speed_limit
+    limit = simulation.vehicle.air_gains.speed_limit
     speeds = np.linspace(0.1, 1.0, 10) * limit
     room = simulation.world.sensor_range - simulation.vehicle.radius - _SPARE
     needed = speeds * simulation.period * periods_ahead + stop_distances(simulation, speeds, air=True)

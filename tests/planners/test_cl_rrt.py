@@ -226,7 +226,7 @@ def test_latency(mission):
 def test_cruise_speed_follows_from_the_sensor():
     """A period of travel and the measured stop fit into what is sensed; a shorter sensor means slower flight."""
     speeds = [CLRRT(Simulation(HYDRONE, World(sensor_range=r))).cruise_speed for r in (1.5, 2.0, 3.0)]
-    assert speeds[0] < speeds[1] < speeds[2] == pytest.approx(0.95 * HYDRONE.air_gains.speed_limit)
+    assert speeds[0] < speeds[1] < speeds[2] == pytest.approx(HYDRONE.air_gains.speed_limit)
     stop = stop_distances(Simulation(HYDRONE, World()), np.array([speeds[1]]), air=True)[0]
     assert 0.5 * speeds[1] + stop <= 2.0 - HYDRONE.radius
 
@@ -263,12 +263,13 @@ def test_evaluate_policy_flies_it():
     assert max(lengths) < 240
 
 
-def test_tree_keeps_the_rules_of_algorithm_1():
+@pytest.mark.parametrize(("mission", "law"), [("AirToWater", EXPERIMENT_1), ("WaterToAir", EXPERIMENT_2)])
+def test_tree_keeps_the_rules_of_algorithm_1(mission, law):
     world = World()
-    scenario = generate(EXPERIMENT_1, world, HYDRONE.radius, np.random.default_rng(0))
+    scenario = generate(law, world, HYDRONE.radius, np.random.default_rng(0))
     simulation = Simulation(HYDRONE, world)
     planner = CLRRT(simulation, iterations=300)
-    observation, _ = make("AirToWater").reset(seed=0, options={"scenario": scenario})
+    observation, _ = make(mission).reset(seed=0, options={"scenario": scenario})
     observation = {**observation, "obstacles": scenario.obstacles}
     _, (memory,) = planner.predict(observation)
     nodes = memory.nodes[: memory.size]
@@ -276,7 +277,7 @@ def test_tree_keeps_the_rules_of_algorithm_1():
     assert (nodes["parent"][1:] < np.arange(1, len(nodes))).all()
     opened = nodes["kind"] == 0
     assert (np.abs(nodes["state"][opened, 2]) > world.zone).all()
-    for i in np.random.default_rng(0).choice(np.arange(1, len(nodes)), 100):
+    for i in range(1, len(nodes)):
         parent, node = nodes[nodes["parent"][i]], nodes[i]
         row = row_at(parent["state"], scenario.goal)
         row["integral"], row["reference"] = parent["integral"], parent["reference"]
@@ -284,7 +285,9 @@ def test_tree_keeps_the_rules_of_algorithm_1():
         np.testing.assert_array_equal(states[-1], node["state"])
         assert row["clearance"][0] > 0.0
         in_zone = np.abs(states[:, 2]) < world.zone
-        assert np.all(np.linalg.norm(states[in_zone, 6:8], axis=1) < 0.1)
+        # under water a sideways drift is not braked, so the way out is a little less upright than the way in
+        allowed = 0.1 if mission == "AirToWater" else 0.13
+        assert np.all(np.linalg.norm(states[in_zone, 6:8], axis=1) < allowed)
         if not in_zone.any():
             assert np.ptp(np.diff(moving[:, :3], axis=0), axis=0).max() < 1e-9  # the reference is linear
 
