@@ -99,6 +99,14 @@ def trim(work, size):
 
 
 @inlined
+def first_of(work, end):
+    """Return the first node of the path to node `end`."""
+    while work.nodes[end].parent > 0:
+        end = work.nodes[end].parent
+    return end
+
+
+@inlined
 def re_propagate(work, values, goal, objective, end, margin, ticks):
     """Propagate the path to node `end` again from the root; return its first node, or minus the node that fails."""
     depth = 0
@@ -136,9 +144,14 @@ def verify_stop(work, values, goal, eye, first, settings, margin, ticks, model, 
     """Check that node `first` can be followed to rest in known free space; write the references to `backup`.
 
     An open or settling node stops by hovering; inside a crossing the stop is the rest of the crossing, then hovering.
-    The clearance kept is `margin` (m). Returns the number of references, 0 if the stop fails.
+    The clearance kept is `margin` (m). Returns the number of references, 0 if the stop fails. With `settings.verify`
+    off every edge passes and is its own stop.
     """
     reach = model.world.sensor_range - model.vehicle.radius
+    if settings.verify == 0.0:
+        for c in range(4):
+            work.backup[0, c] = work.nodes[first].reference[c]
+        return 1
     if not sensed(work, first, eye, reach):
         return 0
     if work.nodes[first].goal:
@@ -184,7 +197,9 @@ def choose(work, values, goal, eye, size, settings, objective, margin, ticks, mo
         end = best_node(work, size)
         if end < 0:
             break
-        first = re_propagate(work, values, goal, objective, end, margin, ticks)
+        first = first_of(work, end)
+        if settings.replay > 0.0:
+            first = re_propagate(work, values, goal, objective, end, margin, ticks)
         if first < 0:
             work.nodes[-first].dead = 1
             prune_orphans(work.nodes, size)

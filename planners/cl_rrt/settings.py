@@ -5,6 +5,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+_SWITCHES = ("replay", "verify")
+
 
 class SettingParams(NamedTuple):
     """`CLRRTSettings` as the kernels read it."""
@@ -17,6 +19,8 @@ class SettingParams(NamedTuple):
     tries: int
     extension: int
     look_ahead: int
+    replay: float  # 1: paths are propagated again before their first edge is sent
+    verify: float  # 1: an edge is sent only if it was seen to be followed by a stop
     step: float  # m an edge in air may move its reference: the safe speed times the period
     prune: float  # 1: samples that cannot beat the best path are dropped
 
@@ -35,6 +39,8 @@ class CLRRTSettings:
         extension: longest extension toward one sample, edges.
         look_ahead: periods that a stop is simulated for.
         max_nodes: size of the tree.
+        replay: whether the path chosen is propagated again against what is known now; False only to see what it is for.
+        verify: whether an edge must be seen to be followed by a stop; False only to see what it is for.
 
     Raises:
         ValueError: a value out of range, named.
@@ -49,11 +55,17 @@ class CLRRTSettings:
     extension: int = 12
     look_ahead: int = 9
     max_nodes: int = 2000
+    replay: bool = True
+    verify: bool = True
 
     def __post_init__(self) -> None:
         """Check every field."""
         for spec in dataclasses.fields(self):
             value = getattr(self, spec.name)
+            if spec.name in _SWITCHES:
+                if not isinstance(value, bool):
+                    raise ValueError(f"CLRRTSettings.{spec.name} must be True or False, got {value!r}")
+                continue
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < 0:
                 raise ValueError(f"CLRRTSettings.{spec.name} must be a number that is not negative, got {value!r}")
         if self.goal_bias + self.column_bias > 1:
@@ -73,4 +85,6 @@ class CLRRTSettings:
             step: how far an edge in air may move its reference, m.
             prune: whether samples that cannot beat the best path are dropped.
         """
-        return SettingParams._make([*(getattr(self, name) for name in SettingParams._fields[:-2]), step, float(prune)])
+        values = (getattr(self, name) for name in SettingParams._fields[:-2])
+        plain = (float(value) if isinstance(value, bool) else value for value in values)
+        return SettingParams._make([*plain, step, float(prune)])
