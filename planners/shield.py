@@ -6,6 +6,10 @@ first of `CANDIDATES` that can is flown instead: the same step shortened, turned
 can, the vehicle goes on to the hover verified last. So a verified way to rest is known at any moment, and a vehicle
 that flies as the model says meets only what cannot be known. The same invariant keeps the CL-RRT safe; the shield has
 no tree, and leaves finding the way to the policy.
+
+A policy without memory may ask for ever for what is refused, under a sphere that hangs just above the surface say. So
+a vehicle that was refused something in `PATIENCE` periods at one place is sent aside for `ASIDE` periods, each time in
+another direction, checked like any other reference; from there the policy tries again.
 """
 
 from collections.abc import Mapping
@@ -17,11 +21,17 @@ from numpy.typing import ArrayLike, NDArray
 from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS, new_block
 from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
+from planners.cl_rrt.references import AIR_GATE, WATER_GATE
 from planners.policy import KEYS, simulation_of
 from planners.stop_check import HELD, guard
 
 __all__ = ["CANDIDATES", "HELD", "Shield", "ShieldState"]
 
+PATIENCE = 7  # refusals within `_PLACE` of one place after which the vehicle is sent aside
+ASIDE = 14  # periods that a step aside lasts: down out of the zone and then some
+_PLACE = 0.5  # m
+_STEP_ASIDE = 2.0  # m
+_TURN = np.pi * (3.0 - np.sqrt(5.0))  # rad, the golden angle: directions tried one after another spread evenly
 _NOWHERE = 1e160  # m: its square overflows, so a sphere there is at distance inf
 
 
@@ -46,6 +56,9 @@ class ShieldState(NamedTuple):
     choice: NDArray[np.int64]  # (n,) of the last period: 0 as proposed, k candidate k, HELD
     interventions: NDArray[np.int64]  # (n,) periods of this episode in which another reference was flown
     periods: NDArray[np.int64]  # (n,) of this episode
+    place: NDArray[np.float64]  # (n, 3) where the vehicle was when it last got away from a place, m
+    stayed: NDArray[np.int64]  # (n,) periods with a refusal since; negative while it is sent aside
+    detours: NDArray[np.int64]  # (n,) steps aside of this episode
 
 
 class Shield:
@@ -98,17 +111,21 @@ class Shield:
         proposed = np.atleast_2d(np.asarray(action, np.float64))
         count = len(proposed)
         in_force = np.reshape(observation["reference"], (-1, 4))
+        positions = np.reshape(observation["state"], (count, -1))[:, :3].astype(np.float64)
         if state is None:
             zero = np.zeros(count, np.int64)
-            state = ShieldState(inner, in_force.astype(np.float64), zero, zero, zero)
+            state = ShieldState(inner, in_force.astype(np.float64), zero, zero, zero, positions, zero, zero)
         if len(state.held) != count:
             raise ValueError(f"state holds {len(state.held)} memories for {count} observations")
         starts = np.zeros(count, bool) if episode_start is None else np.reshape(episode_start, count).astype(bool)
         held = np.where(starts[:, None], in_force, state.held)
+        place, stayed, detours = _watch(positions, starts, state)
+        aside = stayed < 0
+        proposed = np.where(aside[:, None], _beside(place, in_force, detours), proposed)
         sent, held, choice = self.check(observation, proposed, held)
-        interventions = np.where(starts, 0, state.interventions) + (choice != 0)
+        interventions = np.where(starts, 0, state.interventions) + ((choice != 0) | aside)
         periods = np.where(starts, 0, state.periods) + 1
-        new = ShieldState(inner, held, choice, interventions, periods)
+        new = ShieldState(inner, held, choice, interventions, periods, place, stayed, detours)
         return (sent[0] if single else sent).astype(np.float32), new
 
     def check(
@@ -156,3 +173,34 @@ class Shield:
             choice,
         )
         return sent, held, choice
+
+
+def _watch(
+    positions: NDArray[np.float64], starts: NDArray[np.bool_], state: ShieldState
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the new `place`, `stayed` and `detours`: a vehicle that has waited too long begins a step aside."""
+    aside = (state.stayed < 0) & ~starts
+    left = starts | (~aside & (np.linalg.norm(positions - state.place, axis=1) > _PLACE))
+    stayed = np.where(left, 0, state.stayed + (aside | (state.choice != 0)))
+    begins = stayed >= PATIENCE
+    detours = np.where(starts, 0, state.detours) + begins
+    ended = aside & (stayed == 0)
+    place = np.where((left | begins | ended)[:, None], positions, state.place)
+    return place, np.where(begins, -ASIDE, stayed), detours
+
+
+def _beside(
+    place: NDArray[np.float64], in_force: NDArray[np.float64], detours: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return references (n, 4) beside a place, in a direction that each detour turns.
+
+    They lie outside the transition zone: from inside it the first detour leads below, the next one above.
+    """
+    angle = _TURN * detours
+    beside = in_force.astype(np.float64)
+    beside[:, 0] = place[:, 0] + _STEP_ASIDE * np.cos(angle)
+    beside[:, 1] = place[:, 1] + _STEP_ASIDE * np.sin(angle)
+    between = np.abs(place[:, 2]) < min(AIR_GATE, WATER_GATE)
+    air = np.where(between, detours % 2 == 0, place[:, 2] > 0.0)
+    beside[:, 2] = np.where(air, np.maximum(place[:, 2], AIR_GATE), np.minimum(place[:, 2], -WATER_GATE))
+    return beside

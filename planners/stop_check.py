@@ -108,6 +108,9 @@ def _rests(row, eye, hover, spheres, closest, count, margin, ticks, model, block
             return safe
     if s[2] < 0.0:
         x, y = s[0] + _DRIFT * s[6], s[1] + _DRIFT * s[7]
+        w = model.world
+        if not (w.x_min < x < w.x_max and w.y_min < y < w.y_max):
+            return False
         return _clearance(s[0], s[1], s[2], x, y, s[2], spheres, count, model.vehicle.radius) >= margin
     return True
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import hydrone_gym  # noqa: F401
-from hydrone_gym import Outcome
+from hydrone_gym import Outcome, Scenario
 from planners import StraightLine
 from planners.policy import simulation_of
 from planners.shield import CANDIDATES, HELD, Shield
@@ -108,6 +108,53 @@ def test_held_when_nothing_is_safe():
     assert choice.tolist() == [HELD]
     np.testing.assert_array_equal(sent, held)
     np.testing.assert_array_equal(kept, held)
+
+
+class Straight:
+    """Asks for a point between here and the goal, in every period, whatever happened before."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        way = observation["goal"] - observation["state"][:3]
+        step = way * min(1.0, 1.5 / np.linalg.norm(way))
+        return np.append(observation["state"][:3] + step, 0.0).astype(np.float32), None
+
+
+def fly_under_a_lid(env, policy):
+    """From water straight up to a goal in air, under a sphere that hangs just above the surface."""
+    lid = Scenario(start=(0, 0, -2.0, 0), goal=(0, 0, 5.0), obstacles=((0.0, 0.0, 2.0, 1.2),))
+    observation, state, done = env.reset(options={"scenario": lid})[0], None, False
+    while not done:
+        action, state = policy.predict(observation, state)
+        observation, _, terminated, truncated, info = env.step(action)
+        done = terminated or truncated
+    return info["outcome"], state
+
+
+def test_a_step_aside_leads_out_of_a_pocket(monkeypatch):
+    env = gym.make(IDS[0], num_obstacles=1, time_limit=60.0)
+    outcome, state = fly_under_a_lid(env, Shield.for_env(Straight(), env))
+    assert outcome is Outcome.GOAL
+    assert state.detours[0] > 0
+    monkeypatch.setattr("planners.shield.PATIENCE", 10_000)
+    outcome, state = fly_under_a_lid(env, Shield.for_env(Straight(), env))
+    assert outcome is Outcome.TIMEOUT
+    assert state.detours[0] == 0
+
+
+def test_who_waits_of_his_own_accord_is_left_in_peace():
+    env = gym.make(IDS[0], num_obstacles=0)
+    observation, state = env.reset(seed=5)[0], None
+
+    class Hover:
+        def predict(self, observation, state=None, episode_start=None, deterministic=False):
+            return observation["reference"].astype(np.float32), None
+
+    shield = Shield.for_env(Hover(), env)
+    for _ in range(40):
+        action, state = shield.predict(observation, state)
+        observation = env.step(action)[0]
+    assert state.detours.tolist() == [0]
+    assert state.interventions.tolist() == [0]
 
 
 def test_an_episode_begins_anew():
