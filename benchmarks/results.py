@@ -18,7 +18,18 @@ from benchmarks.peers import run as peers
 from benchmarks.timing import RESULTS, ROOT
 from hydrone_gym.rendering.style import BLACK, BLUE, DOTS_PER_INCH, FONTS, PURPLE, RED, WATER
 
-ORDER = ("environments", "peers", "c_reference", "edges", "threads", "neighbour", "memory", "start", "versions")
+ORDER = (
+    "environments",
+    "peers",
+    "c_reference",
+    "edges",
+    "threads",
+    "neighbour",
+    "memory",
+    "start",
+    "rendering",
+    "versions",
+)
 HEAD = """# Measured speed
 
 Written by `python -m benchmarks.results` from `benchmarks/results/*.json`; each table names the command that measures

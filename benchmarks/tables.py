@@ -117,6 +117,11 @@ def start(measured: dict[str, Any]) -> Sheet:
     return Sheet("Seconds from launching Python", columns, rows, ["Cold: no kernel has been compiled yet."])
 
 
+def rendering(measured: dict[str, Any]) -> Sheet:
+    rows = [(name, number(entry["rate"]), f"± {100 * entry['spread']:.0f} %") for name, entry in measured.items()]
+    return Sheet("Pictures a CPU second", ("picture", "pictures/s", "spread"), rows)
+
+
 def versions(measured: dict[str, Any]) -> Sheet:
     rows = [
         (str(size), str(kernels), str(most))
@@ -155,6 +160,7 @@ BUILDERS: dict[str, Callable[[dict[str, Any]], Sheet]] = {
     "neighbour": neighbour,
     "memory": memory,
     "start": start,
+    "rendering": rendering,
     "versions": versions,
     "c_reference": c_reference,
 }

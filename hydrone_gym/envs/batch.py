@@ -91,6 +91,12 @@ class EpisodeBatch:
                 spheres[k, given:] = (_NOWHERE, 0.0, 0.0, 0.0)
         begin_rows(*self.episodes, count, LANES, self._task, rows, starts, goals, spheres, self.report)
 
+    def spheres(self, row: int) -> NDArray[np.float64]:
+        """The spheres of a row's episode, (k, 4) x, y, z, r in m."""
+        block, lane = divmod(row, LANES)
+        found = self.episodes.obstacles[block].reshape(self.options.num_obstacles, 4, LANES)[:, :, lane]
+        return found[found[:, 3] > 0.0]
+
     def _draw(
         self,
         rows: NDArray[np.intp],

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.envs.egocentric import egocentric_space, relative_action_space
 from hydrone_gym.envs.egocentric_rows import EgocentricRows
-from hydrone_gym.envs.info import crossings_of, info_of
+from hydrone_gym.envs.info import conclude, crossings_of, info_of
 from hydrone_gym.envs.options import Options
-from hydrone_gym.envs.requests import check_scenario, load_reference, requested_scenario
+from hydrone_gym.envs.requests import check_running, check_scenario, load_reference, requested_scenario
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.snapshot import Snapshot
 from hydrone_gym.envs.spaces import action_space, observation_space
 from hydrone_gym.envs.task import REPORT, begin_rows, copy_episodes, new_episodes, pack_task, settle
-from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle, named_vehicle
 from hydrone_gym.world.generator import generate
@@ -106,7 +106,8 @@ class HydroneEnv(gym.Env[Any, Any]):
     - `time_limit` (120.0): s.
     - `interface` ("world"): the spaces above; "egocentric": a flat (68,) observation and (3,) relative actions for
       learners, documented in `hydrone_gym.envs.egocentric`.
-    - `render_mode` (None): nothing is drawn yet.
+    - `render_mode` (None): "rgb_array" for pictures, "human" for a window; `hydrone_gym.rendering` describes them.
+    - `render_size` ((640, 480)): width and height of pictures in pixels; `camera` ("overview"): or "chase".
 
     Raises TypeError for an unknown option and ValueError for a value out of range.
 
@@ -114,7 +115,7 @@ class HydroneEnv(gym.Env[Any, Any]):
     - v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 2}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 2}
 
     def __init__(
         self,
@@ -130,13 +131,13 @@ class HydroneEnv(gym.Env[Any, Any]):
         time_limit: float = 120.0,
         interface: str = "world",
         render_mode: str | None = None,
+        render_size: tuple[int, int] = (640, 480),
+        camera: str = "overview",
         **unknown: object,
     ) -> None:
         """Check the options and set up the simulation."""
         if unknown:
             raise TypeError(f"unknown option {', '.join(map(repr, unknown))}; known are {', '.join(known_options())}")
-        if render_mode is not None:
-            raise ValueError(f"render_mode must be None, got {render_mode!r}")
         self.render_mode = render_mode
         self.options = Options(
             mission=mission,
@@ -151,6 +152,8 @@ class HydroneEnv(gym.Env[Any, Any]):
             interface=interface,
         )
         self.simulation = Simulation(self.options.vehicle, self.options.world, period, lanes=1)
+        self._screen = new_screen(render_mode, render_size, camera, self.simulation)
+        self.metadata = {**self.metadata, "render_fps": 1.0 / period}
         references = action_space(self.world)
         space = observation_space(self.vehicle, self.world, self.options.num_obstacles)
         self._sphere_space: Any = space["obstacles"]
@@ -184,14 +187,11 @@ class HydroneEnv(gym.Env[Any, Any]):
         return self._scenario
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
-        """Begin an episode.
+        """Begin an episode; return observation and info, as in the class's description.
 
         Args:
             seed: seeds the random stream of scenarios.
             options: {"scenario": Scenario, or the path of its JSON file} flies that one; it is not random then.
-
-        Returns:
-            Observation and info, as in the class's description.
 
         Raises:
             ValueError: an unknown key, or a scenario that is impossible in this world.
@@ -215,57 +215,53 @@ class HydroneEnv(gym.Env[Any, Any]):
         self._transitions = []
         if self._egocentric is not None:
             self._egocentric.begin(self._episodes, _ONLY)
+        self._screen.begin(0, self._episodes.rows, self._episodes.seen, scenario.obstacles)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Fly one period with the reference moving to the action.
+        """Fly one period with the reference moving to the action; returns are those of the class's description.
 
         Args:
             action: (4,) x, y, z in m and psi in rad; clipped to the action space.
-
-        Returns:
-            Observation, reward, terminated, truncated and info, as in the class's description.
 
         Raises:
             ValueError: an action of another shape, or not finite.
             ResetNeeded: before the first reset, or after the end of an episode.
         """
         now = self._episodes
-        if self._scenario is None:
-            raise ResetNeeded("step() was called before reset(): call reset() first")
-        if now.rows["outcome"][0] != Outcome.RUNNING:
-            ended = Outcome(int(now.rows["outcome"][0])).name
-            raise ResetNeeded(f"step() was called after the episode ended with {ended}: call reset() first")
+        check_running(now.rows["outcome"][0], self._scenario is not None)
         if self._egocentric is None:
             load_reference(action, self._lowest, self._highest, self._reference[0])
         else:
             self._reference[:] = self._egocentric.references(np.asarray(action)[None], now)
-        count = len(self._scenario.obstacles)
+        self._screen.add(0, now.rows, self._reference)
+        count = len(self.scenario.obstacles)
         self.simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
         settle(*now, count, 1, self._task, _ONLY, self._report)
         if self._egocentric is not None:
             self._egocentric.look(now)
+        self._screen.update(now.rows, now.seen)
         report = self._report[0].tolist()
         if report[-1] > 0.0:
             self._transitions += crossings_of(now.rows["crossing_log"][0], int(report[-1]))
         info = info_of(report, self._transitions)
-        outcome = info["outcome"]
-        truncated = outcome is Outcome.TIMEOUT
-        terminated = outcome is not Outcome.RUNNING and not truncated
-        if terminated or truncated:
-            info["is_success"] = outcome is Outcome.GOAL
+        terminated, truncated = conclude(info)
         return self._observation(), report[len(TERMS)], terminated, truncated, info
 
     def _observation(self) -> Observation:
         if self._egocentric is not None:
             return self._egocentric.observation()[0]
         rows = self._episodes.rows
-        return {
-            "state": rows["state"][0].copy(),
-            "integral": rows["integral"][0].copy(),
-            "reference": rows["reference"][0].copy(),
-            "goal": rows["goal"][0].copy(),
-            "obstacles": self._episodes.known[0].copy(),
-        }
+        observation = {key: rows[key][0].copy() for key in ("state", "integral", "reference", "goal")}
+        observation["obstacles"] = self._episodes.known[0].copy()
+        return observation
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a new picture (height, width, 3), or None with a window; raises ResetNeeded before the first reset."""
+        return self._screen.render(0, self._episodes.rows, self._episodes.seen)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._screen.close()
 
     def get_state(self) -> Snapshot:
         """Return a complete snapshot of the episode and the random stream; raises ResetNeeded before reset."""
@@ -277,6 +273,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
             seed=self._np_random_seed,
             egocentric=copy.deepcopy(self._egocentric),
+            track=self._screen.track(0),
         )
 
     def set_state(self, snapshot: Snapshot) -> None:
@@ -293,6 +290,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         self._transitions = [dict(crossing) for crossing in snapshot.transitions]
         self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
         self._np_random_seed = snapshot.seed
+        self._screen.restore(0, self._episodes.rows, self.scenario.obstacles, snapshot.track)
 
 
 def known_options() -> tuple[str, ...]:

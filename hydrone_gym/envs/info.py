@@ -29,6 +29,15 @@ def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> d
     }
 
 
+def conclude(info: dict[str, Any]) -> tuple[bool, bool]:
+    """Return whether an episode is terminated and whether truncated; at either end note `is_success` in its info."""
+    outcome = info["outcome"]
+    if outcome is Outcome.RUNNING:
+        return False, False
+    info["is_success"] = outcome is Outcome.GOAL
+    return outcome is not Outcome.TIMEOUT, outcome is Outcome.TIMEOUT
+
+
 def crossings_of(log: np.ndarray, count: int) -> list[dict[str, Any]]:
     """Return the crossings of one period from its row's log; beyond `LOGGED_CROSSINGS` their details are not kept."""
     crossings = []

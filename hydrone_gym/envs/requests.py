@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.simulation.outcome import RUNNING, Outcome
 from hydrone_gym.world.scenario import Scenario, load_scenario, validate
 from hydrone_gym.world.world import World
 
@@ -75,6 +77,16 @@ def check_scenario(scenario: Scenario, world: World, vehicle_radius: float, boun
         if (sphere < bounds.low[index]).any() or (sphere > bounds.high[index]).any():
             low, high = bounds.low[index].tolist(), bounds.high[index].tolist()
             raise ValueError(f"obstacle {index} must lie between {low} and {high} (m), got {sphere.tolist()}")
+
+
+def check_running(outcome: float, begun: bool) -> None:
+    """Raise ResetNeeded unless an episode has begun and not ended."""
+    if not begun:
+        raise ResetNeeded("step() was called before reset(): call reset() first")
+    if outcome != RUNNING:  # a plain number: comparing with the enumeration takes microseconds
+        raise ResetNeeded(
+            f"step() was called after the episode ended with {Outcome(int(outcome)).name}: call reset() first"
+        )
 
 
 def load_reference(

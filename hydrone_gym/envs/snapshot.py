@@ -6,6 +6,7 @@ from typing import Any
 from hydrone_gym.envs.egocentric_rows import EgocentricRows
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import Episodes
+from hydrone_gym.rendering.track import Track
 from hydrone_gym.world.scenario import Scenario
 
 
@@ -21,6 +22,7 @@ class Snapshot:
         random_state: state of the bit generator that draws scenarios.
         seed: the seed it was made from.
         egocentric: the memory of `interface="egocentric"`, else None.
+        track: the path flown so far, for pictures; None from an environment without `render_mode`.
     """
 
     options: Options
@@ -30,6 +32,7 @@ class Snapshot:
     random_state: dict[str, Any]
     seed: int | None
     egocentric: EgocentricRows | None
+    track: Track | None = None
 
     def check_options(self, options: Options) -> None:
         """Raise ValueError naming every option in which another environment differs."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.core import RenderFrame
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
@@ -20,6 +21,7 @@ from hydrone_gym.envs.requests import check_scenario, load_references, requested
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.spaces import action_space, observation_space
 from hydrone_gym.envs.task import REPORT
+from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle, named_vehicle
@@ -45,11 +47,17 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         threads: threads to spread whole blocks of rows over; used from 512 rows on.
         max_episode_steps: replaces `time_limit` if given, in periods.
 
+    `render_mode` is None or "rgb_array": `render()` returns a tuple of pictures, one a row.
+
     Reset options: `scenario`, one `Scenario` (or path) for all rows or a sequence of one a row, None entries being
     drawn; `reset_mask` (n,) bool, which rows to reset.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata: dict[str, Any] = {
+        "render_modes": ["rgb_array"],
+        "render_fps": 2,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -66,14 +74,14 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         time_limit: float = 120.0,
         interface: str = "world",
         render_mode: str | None = None,
+        render_size: tuple[int, int] = (640, 480),
+        camera: str = "overview",
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         max_episode_steps: int | None = None,
     ) -> None:
         """Check the options and make room for the rows."""
         self.num_envs = _whole("num_envs", num_envs)
-        if render_mode is not None:
-            raise ValueError(f"render_mode must be None, got {render_mode!r}")
         if max_episode_steps is not None:
             time_limit = _whole("max_episode_steps", max_episode_steps) * period
         self.options = Options(
@@ -89,8 +97,10 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             interface=interface,
         )
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(autoreset_mode)}
+        mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": mode, "render_fps": 1.0 / period}
         self._batch = EpisodeBatch(self.options, self.num_envs, _whole("threads", threads))
+        self._screen = new_screen(render_mode, render_size, camera, self.simulation, modes=("rgb_array",))
         world = self.options.world
         references = action_space(world)
         raw = observation_space(self.options.vehicle, world, self.options.num_obstacles)
@@ -153,6 +163,10 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         self._ended[rows] = False
         if self._egocentric is not None:
             self._egocentric.begin(self._batch.episodes, rows)
+        if self.render_mode is not None:
+            now = self._batch.episodes
+            for row in rows.tolist():
+                self._screen.begin(row, now.rows, now.seen, self._batch.spheres(row))
 
     def step(
         self, actions: ArrayLike
@@ -179,6 +193,9 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         again = np.flatnonzero(self._ended)
         if mode == AutoresetMode.DISABLED and len(again):
             raise ResetNeeded(f"step() was called with rows {again.tolist()} ended: reset them with a reset_mask first")
+        if self.render_mode is not None:
+            for row in range(self.num_envs):
+                self._screen.add(row, self._batch.episodes.rows, references)
         self._batch.advance(references)
         if self._egocentric is not None:
             self._egocentric.look(self._batch.episodes)
@@ -196,6 +213,16 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         if ended.any():
             info = self._finish(ended, info, same_step=mode == AutoresetMode.SAME_STEP)
         return self._observation(), rewards, terminated, truncated, info
+
+    def render(self) -> tuple[RenderFrame, ...] | None:
+        """Return a new picture (height, width, 3) of each row, None without a `render_mode`.
+
+        Raises ResetNeeded before the first reset.
+        """
+        now = self._batch.episodes
+        first = self._screen.render(0, now.rows, now.seen)
+        rest: Any = (self._screen.render(row, now.rows, now.seen) for row in range(1, self.num_envs))
+        return None if first is None else (first, *rest)
 
     def _collect_crossings(self) -> None:
         """Append this period's crossings; lists handed out before are left alone."""

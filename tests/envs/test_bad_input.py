@@ -29,7 +29,10 @@ OPTIONS = [
     ({"time_limit": math.nan}, "time_limit must be a positive number (s), got nan"),
     ({"interface": "flat"}, "interface must be one of 'world', 'egocentric', got 'flat'"),
     ({"mission": "up"}, "mission must be one of 'air_to_water', 'water_to_air', 'random', got 'up'"),
-    ({"render_mode": "human"}, "render_mode must be None, got 'human'"),
+    ({"render_mode": "film"}, "render_mode must be one of None, 'rgb_array', 'human', got 'film'"),
+    ({"render_size": (64, 479)}, "render_size must be two even whole numbers from 64 to 4096 (pixels), got (64, 479)"),
+    ({"render_size": 640}, "render_size must be two even whole numbers from 64 to 4096 (pixels), got 640"),
+    ({"camera": "side"}, "camera must be one of 'overview', 'chase', got 'side'"),
 ]
 ACTIONS = [
     (np.zeros(3), "action must have shape (4,) [x, y, z, psi] (m, m, m, rad), got (3,)"),

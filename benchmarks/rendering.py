@@ -1,0 +1,91 @@
+"""Pictures a CPU second at the end of a flight; and the pictures of docs/rendering.md.
+
+python -m benchmarks.rendering
+python -m benchmarks.rendering --pictures
+"""
+
+import dataclasses
+from typing import Any
+
+import gymnasium as gym
+import tyro
+from PIL import Image
+from rich.console import Console
+
+import hydrone_gym  # noqa: F401  (registers the environments)
+from benchmarks import tables
+from benchmarks.timing import ROOT, Contestant, in_turns, save
+from hydrone_gym.evaluation import Flight, fly
+from hydrone_gym.rendering.frame import Painter
+from hydrone_gym.rendering.moment import replay
+from hydrone_gym.rendering.video import moment_of
+from hydrone_gym.rendering.view import View
+from planners import CLRRT
+
+DENSE = {"num_obstacles": 40, "obstacle_radius": (0.8, 1.8)}
+SCENES: dict[str, tuple[dict[str, Any], View]] = {
+    "640 x 480, 20 spheres": ({}, View()),
+    "640 x 480, 40 large spheres": (DENSE, View()),
+    "640 x 480, 20 spheres, chase": ({}, View(camera="chase")),
+    "320 x 240, 20 spheres": ({}, View(size=(320, 240))),
+}
+TICKS = 10  # pictures a call
+PICTURES = {"frame.png": ("overview", 315), "frame-chase.png": ("chase", 105)}  # camera, ticks flown
+
+
+@dataclasses.dataclass
+class Settings:
+    rounds: int = 15
+    """Turns for each scene."""
+    seconds: float = 0.5
+    """CPU seconds a turn."""
+    pictures: bool = False
+    """Draw docs/images/frame*.png instead."""
+
+
+def flown(seed: int, options: dict[str, Any]) -> tuple[gym.Env, Flight]:
+    """A flight from air into water, by the CL-RRT."""
+    env = gym.make("HydroneGym/AirToWater-v0", **options)
+    return env, fly(env, CLRRT.for_env(env), seed=seed)
+
+
+def scene(name: str) -> Contestant:
+    """Pictures of the end of a flight, one a tick, as a film has them."""
+    options, view = SCENES[name]
+    env, flight = flown(12, options)
+    painter = Painter(view, env.unwrapped.world, env.unwrapped.vehicle)  # type: ignore[attr-defined]
+    last = moment_of(flight)
+    counts = range(len(last.ticks) - TICKS + 1, len(last.ticks) + 1)
+    moments = list(replay(last, counts, env.unwrapped.world.sensor_range))  # type: ignore[attr-defined]
+
+    def run() -> float:
+        for moment in moments:
+            painter.paint(moment)
+        return len(moments)
+
+    return Contestant(name, run)
+
+
+def draw() -> None:
+    """Write the pictures of docs/rendering.md."""
+    env, flight = flown(5, DENSE)
+    world, vehicle = env.unwrapped.world, env.unwrapped.vehicle  # type: ignore[attr-defined]
+    for name, (camera, ticks) in PICTURES.items():
+        (moment,) = replay(moment_of(flight), [ticks], world.sensor_range)
+        picture = Painter(View(camera=camera), world, vehicle).paint(moment)
+        Image.fromarray(picture).save(ROOT / "docs" / "images" / name, optimize=True)
+
+
+def main(settings: Settings) -> None:
+    if settings.pictures:
+        draw()
+        return
+    contestants = [scene(name) for name in SCENES]
+    in_turns(contestants, settings.rounds, settings.seconds)
+    measured = {entry.name: {"rate": entry.rate, "spread": entry.spread} for entry in contestants}
+    save("rendering", "python -m benchmarks.rendering", {"measured": measured})
+    Console().print(tables.rendering(measured))
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings, description=__doc__))

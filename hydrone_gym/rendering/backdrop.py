@@ -1,0 +1,226 @@
+"""What every ray can meet: sky, sandy floor, water surface and the walls of the box, all without textures."""
+
+import math
+from typing import NamedTuple
+
+from hydrone_gym._jit import inlined
+
+GRID = 5.0  # m between the lines on the floor and on the far walls
+_SEA = 120.0  # m: how far beyond the box water and floor reach for a camera inside it
+_HAZE = 40.0  # m: from where on they fade into the horizon there
+_HORIZON = (0.965, 0.975, 0.985)
+_ZENITH = (0.52, 0.73, 0.93)
+_BELOW = (0.74, 0.79, 0.84)
+_SAND = (0.87, 0.81, 0.68)
+_LINE = (0.45, 0.50, 0.55)
+
+
+class Camera(NamedTuple):
+    """Where the eye is, and unit vectors to the right, up and forward; `pixel` is one pixel's width at distance 1."""
+
+    ex: float
+    ey: float
+    ez: float
+    rx: float
+    ry: float
+    rz: float
+    ux: float
+    uy: float
+    uz: float
+    fx: float
+    fy: float
+    fz: float
+    pixel: float
+
+
+class Box(NamedTuple):
+    """The world as it is drawn (m)."""
+
+    x0: float
+    y0: float
+    z0: float
+    x1: float
+    y1: float
+    z1: float
+    zone: float
+    sea: float  # 1: water and floor reach to the horizon; 0: they end at the walls, which show a grid
+
+
+class Span(NamedTuple):
+    """Where a ray is inside the box and under water (lengths along it), and the axes of the walls it passes.
+
+    Then one by each part of its direction, as divisions take long.
+    """
+
+    enter: float
+    leave: float
+    enter_axis: int
+    leave_axis: int
+    dive: float
+    rise: float
+    by_x: float
+    by_y: float
+    by_z: float
+
+
+@inlined
+def mix(a, b, share):
+    """A colour between two."""
+    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2])
+
+
+@inlined
+def _cut(o, inverse, low, high):
+    """Where a ray passes between two planes."""
+    a, b = (low - o) * inverse, (high - o) * inverse
+    return min(a, b), max(a, b)
+
+
+@inlined
+def span_of(camera, box, dx, dy, dz):
+    """Return the `Span` of a ray from the eye."""
+    reach = _SEA * box.sea
+    by_x, by_y, by_z = 1.0 / dx, 1.0 / dy, 1.0 / dz
+    x_in, x_out = _cut(camera.ex, by_x, box.x0 - reach, box.x1 + reach)
+    y_in, y_out = _cut(camera.ey, by_y, box.y0 - reach, box.y1 + reach)
+    z_in, z_out = _cut(camera.ez, by_z, box.z0, box.z1 + reach)
+    dive, rise = _cut(camera.ez, by_z, box.z0, 0.0)
+    side_in, side_out = max(x_in, y_in), min(x_out, y_out)
+    enter, leave = max(side_in, z_in), min(side_out, z_out)
+    enter_axis = 2 if z_in > side_in else (0 if x_in > y_in else 1)
+    leave_axis = 2 if z_out < side_out else (0 if x_out < y_out else 1)
+    dive, rise = max(max(dive, side_in), 0.0), min(rise, side_out)
+    return Span(enter, leave, enter_axis, leave_axis, dive, rise, by_x, by_y, by_z)
+
+
+@inlined
+def sky(dz):
+    """Background in a direction of which the upward part is dz."""
+    if dz > 0.0:
+        return mix(_HORIZON, _ZENITH, min(1.7 * dz, 1.0))
+    return mix(_HORIZON, _BELOW, min(-1.4 * dz, 1.0))
+
+
+@inlined
+def _stroke(distance, half_width, blur, t, camera, slope, across, normal):
+    """How much of a pixel a line on a plane covers.
+
+    Args:
+        distance: from the line's middle, along one axis of the plane, m.
+        half_width: of the line, m.
+        blur: no pixel is wider than this there, m.
+        t: length of the ray, m.
+        camera: the camera.
+        slope: the ray's part along that axis by its part along the plane's normal.
+        across, normal: the parts of the camera's right and up along that axis, and along the normal.
+    """
+    if distance > half_width + blur:
+        return 0.0
+    wide = abs(across[0] - slope * normal[0]) + abs(across[1] - slope * normal[1])
+    sharp = 1.0 / (t * camera.pixel * wide + 1e-9)
+    return max(0.0, min(1.0, 0.5 + (half_width - distance) * sharp)) * min(1.0, 2.0 * half_width * sharp)
+
+
+@inlined
+def _off_lines(value, low, high):
+    """Distance to the nearest line of the grid along one axis, the box's edges included."""
+    nearest = GRID * math.floor(value * (1.0 / GRID) + 0.5)
+    edge = min(abs(value - low), abs(value - high))
+    return min(abs(value - nearest), edge) if low < nearest and nearest < high else edge
+
+
+@inlined
+def _level_lines(camera, box, span, dx, dy, t, half_width, blur):
+    """Coverage by the grid's lines on a level plane."""
+    right, up, normal = (camera.rx, camera.ux), (camera.ry, camera.uy), (camera.rz, camera.uz)
+    x, y = _off_lines(camera.ex + t * dx, box.x0, box.x1), _off_lines(camera.ey + t * dy, box.y0, box.y1)
+    return max(
+        _stroke(x, half_width, blur, t, camera, dx * span.by_z, right, normal),
+        _stroke(y, half_width, blur, t, camera, dy * span.by_z, up, normal),
+    )
+
+
+@inlined
+def _haze(box, t):
+    """Share of the horizon in what is so far away (m)."""
+    share = t / (t + _HAZE)
+    return box.sea * share * share
+
+
+@inlined
+def _floor(camera, box, span, dx, dy, t):
+    """The sand, with a grid."""
+    line = _level_lines(camera, box, span, dx, dy, t, 0.045, t * camera.pixel * (1.0 - span.by_z))
+    return mix(mix(_SAND, _LINE, 0.55 * line), _HORIZON, _haze(box, t))
+
+
+@inlined
+def _wall(camera, box, span, axis, dx, dy, dz, t):
+    """How strongly a wall of the box is drawn at a point: (grid, edges with the waterline, transition zone)."""
+    z = camera.ez + t * dz
+    upright = camera.rz, camera.uz
+    if axis == 0:
+        inverse, flat, normal, part = span.by_x, (camera.ry, camera.uy), (camera.rx, camera.ux), dy
+        along, low, top = camera.ey + t * dy, box.y0, box.y1
+    else:
+        inverse, flat, normal, part = span.by_y, (camera.rx, camera.ux), (camera.ry, camera.uy), dx
+        along, low, top = camera.ex + t * dx, box.x0, box.x1
+    blur = t * camera.pixel * (1.0 + abs(inverse))
+    side, rise = part * inverse, dz * inverse
+    grid = max(
+        _stroke(_off_lines(along, low, top), 0.035, blur, t, camera, side, flat, normal),
+        _stroke(_off_lines(z, box.z0, box.z1), 0.035, blur, t, camera, rise, upright, normal),
+    )
+    edge = max(
+        _stroke(min(abs(along - low), abs(along - top)), 0.05, blur, t, camera, side, flat, normal),
+        _stroke(abs(z), 0.05, blur, t, camera, rise, upright, normal),
+    )
+    rim = _stroke(abs(abs(z) - box.zone), 0.03, blur, t, camera, rise, upright, normal)
+    return grid, edge, max(0.35 if abs(z) < box.zone else 0.0, rim)
+
+
+@inlined
+def exit_colour(camera, box, span, dx, dy, dz):
+    """What a ray sees that meets no shape: floor, far wall or sky."""
+    background = sky(dz)
+    if span.leave <= max(span.enter, 0.0):
+        return background
+    if span.leave_axis == 2:
+        return _floor(camera, box, span, dx, dy, span.leave) if dz < 0.0 else background
+    if box.sea > 0.0:
+        return background
+    grid, edge, band = _wall(camera, box, span, span.leave_axis, dx, dy, dz, span.leave)
+    colour = mix(background, (0.34, 0.71, 0.91), 0.45 * band)
+    return mix(colour, _LINE, max(0.30 * grid, 0.5 * edge))
+
+
+@inlined
+def near_wall(camera, box, span, dx, dy, dz):
+    """Colour and opacity of a wall that a ray passes on its way into the box: edges and zone only."""
+    _, edge, band = _wall(camera, box, span, span.enter_axis, dx, dy, dz, span.enter)
+    return (0.10, 0.45, 0.70), max(0.35 * edge, 0.22 * band)
+
+
+@inlined
+def _swell(turns):
+    """A wave of period 1 between -1 and 1, of parabolas: a third of the time of a sine."""
+    phase = abs(turns - math.floor(turns) - 0.5)
+    near = min(phase, 0.5 - phase)
+    wave = 1.0 - 16.0 * near * near
+    return wave if phase < 0.25 else -wave
+
+
+@inlined
+def surface(camera, box, span, dx, dy, dz, t):
+    """Colour and opacity of the water's surface, more of a mirror the flatter it is looked at."""
+    x, y = camera.ex + t * dx, camera.ey + t * dy
+    blur = t * camera.pixel * (1.0 + abs(span.by_z))
+    line = _level_lines(camera, box, span, dx, dy, t, 0.03, blur)
+    wave = _swell(0.30 * x + 0.17 * y) + _swell(-0.21 * x + 0.36 * y + 0.2) + _swell(0.1 * x - 0.13 * y + 0.3)
+    wave = wave * max(0.0, 1.0 - blur)  # waves that are narrower than a pixel would flicker
+    flat = 1.0 - abs(dz)
+    mirror = 0.04 + 0.96 * flat * flat * flat * flat * flat
+    colour = mix(mix((0.42, 0.75, 0.92), (0.93, 0.97, 1.0), 0.35 + 0.10 * wave), (1.0, 1.0, 1.0), 0.7 * line)
+    opacity = 0.16 + 0.55 * mirror + 0.03 * wave + 0.25 * line
+    far = _haze(box, t)
+    return mix(colour, _HORIZON, far), min(opacity + far, 0.95)

@@ -1,0 +1,121 @@
+"""Where a picture is taken from, and which part of it a shape can reach."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FIELD_OF_VIEW = 32.0  # degrees, over the height of the picture
+CHASE_FIELD = 50.0
+_BACK, _ABOVE, _AHEAD = 5.0, 2.3, 1.0  # m: where the chase camera is, and how far before the vehicle it looks
+_TICKS_REMEMBERED = 0.033  # share by which a move counts less with every tick since: half of it after 1 s
+_MARGIN = 0.97  # of the picture that the box may fill
+
+
+class Pose(NamedTuple):
+    """A camera: its eye (m) and the unit vectors to its right, up and forward, each (3,); field of view in degrees."""
+
+    eye: NDArray[np.float64]
+    right: NDArray[np.float64]
+    up: NDArray[np.float64]
+    forward: NDArray[np.float64]
+    field: float
+
+    def pixel(self, height: int) -> float:
+        """Width of a pixel at distance 1, for a picture so many pixels high."""
+        return float(2.0 * np.tan(np.radians(0.5 * self.field)) / height)
+
+    def project(self, points: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.float64]:
+        """Return where points (n, 3) in m appear, (n, 2) columns and rows, in a picture of width and height `size`."""
+        offsets = points - self.eye
+        depth = self.pixel(size[1]) * (offsets @ self.forward)
+        across, upward = offsets @ self.right / depth, offsets @ self.up / depth
+        return np.stack((0.5 * size[0] + across, 0.5 * size[1] - upward), axis=1)
+
+
+def looking(direction: NDArray[np.float64], eye: NDArray[np.float64], field: float) -> Pose:
+    """Return the level camera at an eye (m) that looks along a direction, which must not be vertical."""
+    forward = direction / np.linalg.norm(direction)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return Pose(eye, right, np.cross(right, forward), forward, field)
+
+
+def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, aspect: float) -> Pose:
+    """Return the nearest camera that sees all of some points.
+
+    Args:
+        corners: (n, 3) m.
+        azimuth, elevation: where it stands as seen from the points, degrees.
+        aspect: width by height of the picture.
+    """
+    a, e = np.radians([azimuth, elevation])
+    pose = looking(-np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]), np.zeros(3), FIELD_OF_VIEW)
+    tangent = np.tan(np.radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
+    depth = corners @ pose.forward
+    # a corner is in view when its offset to each side is at most tangent times its depth: linear in the eye's place
+    sides = [(corners @ pose.right, tangent * aspect), (corners @ pose.up, tangent)]
+    spans = [((side - k * depth).max(), (side + k * depth).min(), k) for side, k in sides]
+    back = max((high - low) / (2.0 * k) for high, low, k in spans)
+    across, upward = (0.5 * (high + low) for high, low, _ in spans)
+    return pose._replace(eye=across * pose.right + upward * pose.up - back * pose.forward)
+
+
+def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:
+    """Return the camera that follows a vehicle.
+
+    It stands behind and above as the vehicle has been moving lately, which turns slowly, whatever the heading.
+
+    Args:
+        path: (N, 3) where the vehicle was at every tick, m.
+        goal: (3,) m: what it looks towards before the vehicle has moved.
+    """
+    moves = np.diff(path[:, :2], axis=0)
+    recent = np.exp(-_TICKS_REMEMBERED * np.arange(len(moves))[::-1])
+    ahead = goal[:2] - path[0, :2]
+    distance = float(np.linalg.norm(ahead))
+    ahead = ahead / distance if distance > 0.0 else np.array([1.0, 0.0])
+    lead = ahead + recent @ moves
+    length = float(np.linalg.norm(lead))
+    forward = np.append(lead / length if length > 1e-6 else ahead, 0.0)
+    up = np.array([0.0, 0.0, 1.0])
+    return looking((_BACK + _AHEAD) * forward - _ABOVE * up, path[-1] - _BACK * forward + _ABOVE * up, CHASE_FIELD)
+
+
+def outlines(
+    pose: Pose, ends: NDArray[np.float64], radii: NDArray[np.float64], size: tuple[int, int], tile: int
+) -> NDArray[np.int64]:
+    """Return the tiles that shapes can reach in a picture.
+
+    Args:
+        pose: the camera.
+        ends: (n, 2, 3) two points of each shape, m; it lies in the hull of the balls around them.
+        radii: (n,) of those balls, m.
+        size: (width, height) of the picture, pixels.
+        tile: pixels a tile.
+
+    Returns:
+        (n, 4) int64: first column and row, last column and row of tiles, the last excluded.
+    """
+    width, height = size
+    offsets = ends - pose.eye
+    depth = offsets @ pose.forward
+    r = radii[:, None]
+    gap = depth**2 - r**2
+    near = depth <= 1.001 * r
+    safe = np.where(near, 1.0, gap)
+    lows, highs = [], []
+    for axis, middle, sign in ((pose.right, 0.5 * width, 1.0), (pose.up, 0.5 * height, -1.0)):
+        side = sign * (offsets @ axis)
+        # tangents from the eye to the ball, in the plane of this axis and the depth
+        root = r * np.sqrt(np.maximum(side**2 + gap, 0.0))
+        low = (side * depth - root) / safe / pose.pixel(height) + middle
+        high = (side * depth + root) / safe / pose.pixel(height) + middle
+        count = -(-int(2.0 * middle) // tile)
+        first = np.floor((np.where(near, -np.inf, low).min(axis=1) - 1.0) / tile)
+        last = np.floor((np.where(near, np.inf, high).max(axis=1) + 1.0) / tile) + 1.0
+        lows.append(np.clip(first, 0, count))
+        highs.append(np.clip(last, 0, count))
+    tiles = np.stack((*lows, *highs), axis=1).astype(np.int64)
+    tiles[(depth + r <= 0.0).all(axis=1)] = 0  # wholly behind the eye
+    return tiles

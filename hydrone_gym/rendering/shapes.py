@@ -1,0 +1,140 @@
+"""What a picture shows, as shapes for the ray caster: obstacles, vehicle, path, reference and goal."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from hydrone_gym.rendering import style
+from hydrone_gym.rendering.camera import Pose
+from hydrone_gym.rendering.solids import CAPSULE, DISC, SHADOW, SHAPE_FIELDS, SPHERE
+
+Shapes = NDArray[np.float64]  # (n, len(SHAPE_FIELDS))
+_OPACITY = SHAPE_FIELDS.index("opacity")
+_BLACK = ("#101010", "#4a4a4a")
+_WHITE = ("#e8e8e8", "#ffffff")
+_PATH = ("#8f3d00", "#ff7a1a")
+_GOAL = ("#8a3f66", "#f39ac8")
+_FRONT = ("#8f3d00", "#ff7a1a")
+_ARM = ("#10283a", "#4a6f8c")
+_REAR = ("#10283a", "#f4f7fa")
+_SHADE = ("#0a2238", "#0a2238")
+_HAIR = 0.005  # m: a shadow lies on its ground
+_PLUMB = ("#4f6475", "#6d8596")
+
+
+def rgb(colour: str) -> tuple[float, float, float]:
+    """Return the parts of a colour "#rrggbb", from 0 to 1."""
+    red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return red, green, blue
+
+
+def _rows(
+    kind: int,
+    a: ArrayLike,
+    b: ArrayLike,
+    radius: ArrayLike,
+    colours: tuple[str, str],
+    opacity: float = 1.0,
+    foam: float = 0.0,
+) -> Shapes:
+    """Return shapes that share their colours; `a` is (n, 3), `b` (n, 3) or (3,), `radius` (n,) or a number, in m."""
+    first = np.atleast_2d(np.asarray(a, dtype=np.float64))
+    rows = np.empty((len(first), len(SHAPE_FIELDS)))
+    rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7] = kind, first, b, radius
+    rows[:, 8:11], rows[:, 11:14] = rgb(colours[0]), rgb(colours[1])
+    rows[:, 14], rows[:, 15] = opacity, foam
+    return rows
+
+
+def spheres(obstacles: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
+    """Obstacles (M, 4) x, y, z, r in m: dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
+    rows = _rows(SPHERE, obstacles[:, :3], 0.0, obstacles[:, 3], style.DETECTED, foam=1.0)
+    rows[detected & veiled, _OPACITY] = 0.7
+    hidden = _rows(SPHERE, obstacles[~detected, :3], 0.0, obstacles[~detected, 3], style.GLASS, opacity=0.8, foam=1.0)
+    rows[~detected] = hidden
+    return rows
+
+
+def vehicle(state: NDArray[np.float64], arm: float, scale: float) -> Shapes:
+    """The vehicle at a state (12,): rotors on its axes as in the model, the front one in the colour of the path.
+
+    Args:
+        state: as in the observation.
+        arm: from the middle to a rotor, m.
+        scale: how many times its true size it is drawn.
+    """
+    turn = Rotation.from_euler("ZXY", state[[5, 3, 4]]).as_matrix()
+    size = arm * scale
+
+    def place(*points: tuple[float, float, float]) -> NDArray[np.float64]:
+        return state[:3] + size * np.array(points) @ turn.T
+
+    hubs = place((1, 0, 0.12), (0, 1, 0.12), (-1, 0, 0.12), (0, -1, 0.12))
+    ends = place((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
+    feet = place((1, 0, -0.3), (0, 1, -0.3), (-1, 0, -0.3), (0, -1, -0.3))
+    low, high = place((0, 0, -0.18), (0, 0, 0.12))
+    front, up, thick = slice(0, 1), turn[:, 2], 0.11 * size
+    return np.vstack(
+        (
+            _rows(CAPSULE, low, high, 0.26 * size, _ARM),
+            _rows(CAPSULE, np.repeat(state[None, :3], 3, axis=0), ends[1:], thick, _ARM),
+            _rows(CAPSULE, state[:3], ends[front], 1.2 * thick, _FRONT),
+            _rows(CAPSULE, feet, hubs, 0.6 * thick, _ARM),
+            _rows(DISC, hubs[1:], up, 0.62 * size, _REAR),
+            _rows(DISC, hubs[front], up, 0.62 * size, _FRONT),
+            _rows(DISC, feet, up, 0.3 * size, _ARM),
+        )
+    )
+
+
+def shadow(position: NDArray[np.float64], floor: float, radius: float) -> Shapes:
+    """The vehicle's shadow on what is below it, water or floor (at z = `floor`), wider and fainter from high above."""
+    ground = 0.0 if position[2] > 0.0 else floor
+    height = max(position[2] - ground, 0.0)
+    below = np.array([position[0], position[1], ground + _HAIR])
+    return _rows(SHADOW, below, (0.0, 0.0, 1.0), radius * (1.0 + 0.06 * height), _SHADE, 0.5 / (1.0 + 0.08 * height))
+
+
+def path(points: NDArray[np.float64], radius: float) -> Shapes:
+    """The flown path (N, 3) as a tube, with a ball at its start."""
+    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    # one point a stretch, counted from the start, so that the tube does not shimmer as the path grows
+    steps = np.floor(along / (2.0 * radius)).astype(np.int64)
+    new = np.diff(steps, prepend=-1) > 0
+    new[-1] = True
+    chosen = points[new]
+    moved = (chosen[1:] != chosen[:-1]).any(axis=1)
+    tube = _rows(CAPSULE, chosen[:-1][moved], chosen[1:][moved], radius, _PATH)
+    return np.vstack((_rows(SPHERE, points[0], 0.0, 2.2 * radius, _BLACK), tube))
+
+
+def plumb(point: NDArray[np.float64], radius: float) -> Shapes:
+    """A thin vertical line from a point (3,) in m to the water surface."""
+    foot = np.array([point[0], point[1], 0.0])
+    return _rows(CAPSULE, point, foot, radius, _PLUMB)[: int(abs(point[2]) > 1e-3)]
+
+
+def goal(position: NDArray[np.float64], reach: float, pose: Pose, arm: float, radius: float) -> Shapes:
+    """The goal: a glass ball within which it counts as reached (m), and a cross that faces the camera."""
+    ends = arm * np.array([pose.right + pose.up, pose.right - pose.up]) / np.sqrt(2.0)
+    return np.vstack(
+        (
+            _rows(CAPSULE, position - ends, position + ends, radius, _GOAL),
+            _rows(SPHERE, position, 0.0, reach, (_GOAL[0], style.PURPLE), opacity=0.9),
+        )
+    )
+
+
+def reference(position: NDArray[np.float64], pose: Pose, size: float, radius: float) -> Shapes:
+    """The reference: a black ring with a dot, which faces the camera, edged in white to be seen on dark obstacles."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 17)[:, None]
+    ring = position + size * (np.cos(turns) * pose.right + np.sin(turns) * pose.up)
+    edge = ring + 2.0 * radius * pose.forward
+    return np.vstack(
+        (
+            _rows(CAPSULE, ring[:-1], ring[1:], radius, _BLACK),
+            _rows(CAPSULE, edge[:-1], edge[1:], 1.8 * radius, _WHITE),
+            _rows(SPHERE, position, 0.0, 1.4 * radius, _BLACK),
+            _rows(SPHERE, position + 3.0 * radius * pose.forward, 0.0, 2.4 * radius, _WHITE),
+        )
+    )
