@@ -56,7 +56,7 @@ class ShieldedVecEnv(HydroneVecEnv):
         """Make the environment and put the shield between actions and vehicle."""
         super().__init__(env_id, num_envs, **options)
         self.shielded = ShieldedRows(self)
-        self.env._egocentric = self.shielded
+        self.env.egocentric = self.shielded
 
     def step_wait(self) -> VecEnvStepReturn:
         """Fly one period in every row."""

@@ -114,5 +114,6 @@ class HydroneVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """No row is drawn."""
-        return [None] * self.num_envs
+        """Return a picture of each row, None without `render_mode="rgb_array"`."""
+        pictures: Any = self.env.render()
+        return [None] * self.num_envs if pictures is None else list(pictures)

@@ -49,6 +49,9 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
 
     `render_mode` is None or "rgb_array": `render()` returns a tuple of pictures, one a row.
 
+    `egocentric` translates for `interface="egocentric"`; another `EgocentricRows` may take its place before the first
+    reset, to change the references that actions stand for.
+
     Reset options: `scenario`, one `Scenario` (or path) for all rows or a sequence of one a row, None entries being
     drawn; `reset_mask` (n,) bool, which rows to reset.
     """
@@ -105,9 +108,9 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         references = action_space(world)
         raw = observation_space(self.options.vehicle, world, self.options.num_obstacles)
         self._sphere_space: Any = raw["obstacles"]
-        self._egocentric = EgocentricRows(self.options, self.num_envs) if interface == "egocentric" else None
-        self.single_action_space = references if self._egocentric is None else relative_action_space()
-        self.single_observation_space = raw if self._egocentric is None else egocentric_space()
+        self.egocentric = EgocentricRows(self.options, self.num_envs) if interface == "egocentric" else None
+        self.single_action_space = references if self.egocentric is None else relative_action_space()
+        self.single_observation_space = raw if self.egocentric is None else egocentric_space()
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._low, self._high = references.low.astype(np.float64), references.high.astype(np.float64)
@@ -161,8 +164,8 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         for row in rows:
             self._transitions[row] = []
         self._ended[rows] = False
-        if self._egocentric is not None:
-            self._egocentric.begin(self._batch.episodes, rows)
+        if self.egocentric is not None:
+            self.egocentric.begin(self._batch.episodes, rows)
         if self.render_mode is not None:
             now = self._batch.episodes
             for row in rows.tolist():
@@ -185,10 +188,10 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         """
         if not self._generators:
             raise ResetNeeded("step() was called before reset(): call reset() first")
-        if self._egocentric is None:
+        if self.egocentric is None:
             references = load_references(actions, self._low, self._high, self.num_envs)
         else:
-            references = self._egocentric.references(actions, self._batch.episodes)
+            references = self.egocentric.references(actions, self._batch.episodes)
         mode = self.metadata["autoreset_mode"]
         again = np.flatnonzero(self._ended)
         if mode == AutoresetMode.DISABLED and len(again):
@@ -197,8 +200,8 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             for row in range(self.num_envs):
                 self._screen.add(row, self._batch.episodes.rows, references)
         self._batch.advance(references)
-        if self._egocentric is not None:
-            self._egocentric.look(self._batch.episodes)
+        if self.egocentric is not None:
+            self.egocentric.look(self._batch.episodes)
         if len(again):
             self._begin(again, [None] * len(again))
         report = self._batch.report
@@ -253,8 +256,8 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         }
 
     def _observation(self) -> dict[str, NDArray[np.float64]] | NDArray[np.float32]:
-        if self._egocentric is not None:
-            return self._egocentric.observation()
+        if self.egocentric is not None:
+            return self.egocentric.observation()
         now = self._batch.episodes
         rows = now.rows
         return {
