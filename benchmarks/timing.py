@@ -7,14 +7,13 @@ leave ratios that repeat within a few percent.
 import dataclasses
 import json
 import os
-import platform
 import statistics
-import subprocess
 import time
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from hydrone_gym.evaluation import provenance
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -66,44 +65,13 @@ def in_turns(
             contestant.rates.append(turn(contestant.run, seconds, clock))
 
 
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
-
-
-def _commit() -> str:
-    """Commit of the sources, with '+' when they differ from it."""
-    git = ["git", "-C", str(ROOT)]
-    try:
-        name = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True)
-        changes = subprocess.run(
-            [*git, "status", "--porcelain", "--", "hydrone_gym", "planners"], capture_output=True, text=True, check=True
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
-    return name.stdout.strip() + ("+" if changes.stdout.strip() else "")
-
-
 def machine(packages: tuple[str, ...] = ("numpy", "numba", "gymnasium")) -> dict[str, Any]:
     """What a figure means nothing without: processor, cores, versions, commit, date."""
-    versions = {"python": platform.python_version()}
-    for package in packages:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = "absent"
     return {
-        "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "system": f"{platform.system()} {platform.machine()}",
+        **provenance.machine(),
         "load": [round(value, 2) for value in os.getloadavg()] if hasattr(os, "getloadavg") else None,
-        "versions": versions,
-        "commit": _commit(),
+        "versions": provenance.versions(packages),
+        "commit": provenance.commit() or "unknown",
         "date": time.strftime("%Y-%m-%d"),
     }
 

@@ -1,6 +1,7 @@
 """The command `hydrone`: one module a subcommand, whose class has the options as fields and `run`, the exit code.
 
-Exit codes: 0 success, 1 a mission that did not end at the goal, 2 bad input, told in one line.
+Exit codes: 0 success; 1 a mission that did not end at the goal, or an evaluation that could not be finished; 2 bad
+input, told in one line; 130 an evaluation stopped by Ctrl-C.
 """
 
 import os
@@ -10,13 +11,14 @@ from collections.abc import Sequence
 import tyro
 
 from agents.train_command import Train
+from hydrone_gym.cli.evaluate import Evaluate
 from hydrone_gym.cli.fly import Fly
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `arguments` default to those of the process."""
     command = tyro.extras.subcommand_cli_from_dict(
-        {"fly": Fly, "train": Train},
+        {"fly": Fly, "evaluate": Evaluate, "train": Train},
         prog="hydrone",
         description="Fly the HyDrone in air, through the water surface and below it.",
         args=arguments,

@@ -13,17 +13,16 @@ from typing import Any, Literal
 import gymnasium as gym
 import numpy as np
 
+from hydrone_gym.cli.compiling import announce_compiling, kernels_of
 from hydrone_gym.evaluation.flight import Flight, fly
+from hydrone_gym.evaluation.policies import find_policy
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
-from hydrone_gym.simulation.rows import advance_rows
 from hydrone_gym.world.scenario import Scenario, load_scenario
-from planners import CLRRT, StraightLine
-from planners.cl_rrt.execute import cycle
+from planners import CLRRT
 
 EXPERIMENTS = {1: "HydroneGym/AirToWater-v0", 2: "HydroneGym/WaterToAir-v0"}
 _TREE_ITERATIONS = 400  # samples of the tree figure
-_COMPILING = "compiling kernels (once after install, about 30 s)"
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,8 @@ class Fly:
     """Seed of the random world and of the planner."""
     obstacles: int | None = None
     """Number of spheres, 20 unless given."""
-    policy: Literal["clrrt", "straight"] = "clrrt"
-    """CL-RRT, or straight lines without an eye for obstacles."""
+    policy: str = "clrrt"
+    """Registered name such as clrrt or straight-line; module:attribute, file.py:attribute, or an agent's folder."""
     iterations: int | None = None
     """Samples the CL-RRT draws each cycle, the planner's own number unless given."""
     time_budget: float | None = None
@@ -92,15 +91,16 @@ class Fly:
             raise ValueError("--iterations and --time-budget exclude each other")
         if self.policy != "clrrt" and (self.iterations is not None or self.time_budget is not None):
             raise ValueError("--iterations and --time-budget are options of --policy clrrt")
+        source = find_policy(self.policy)
         if self.scenario is None:
-            self._announce_compiling()
+            announce_compiling(*kernels_of(source))
             numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
             count = 20 if self.obstacles is None else self.obstacles
             return [self._mission(f"experiment-{number}", EXPERIMENTS[number], count, None) for number in numbers]
         if self.experiment is not None or self.obstacles is not None:
             raise ValueError("--scenario excludes --experiment and --obstacles")
         scenario = load_scenario(self.scenario)
-        self._announce_compiling()
+        announce_compiling(*kernels_of(source))
         return [self._mission(self.scenario.stem, "HydroneGym/Mission-v0", len(scenario.obstacles), scenario)]
 
     def _mission(self, name: str, env_id: str, obstacles: int, scenario: Scenario | None) -> Mission:
@@ -110,18 +110,11 @@ class Fly:
         return Mission(name, env, self._policy(env), env.get_wrapper_attr("scenario"), observation)
 
     def _policy(self, env: gym.Env) -> Policy:
-        if self.policy == "straight":
-            return StraightLine.for_env(env)
-        if self.iterations is None:
+        if self.time_budget is not None:
             return CLRRT.for_env(env, time_budget=self.time_budget, seed=self.seed)
-        return CLRRT.for_env(env, iterations=self.iterations, seed=self.seed)
-
-    def _announce_compiling(self) -> None:
-        """Say why nothing seems to happen when the large kernels have not been compiled yet."""
-        kernels: tuple[Any, ...] = (advance_rows, cycle) if self.policy == "clrrt" else (advance_rows,)
-        folders = [kernel.stats.cache_path for kernel in kernels]
-        if not all(folder and any(Path(folder).glob("*.nbi")) for folder in folders):
-            print(_COMPILING, file=sys.stderr, flush=True)
+        if self.iterations is not None:
+            return CLRRT.for_env(env, iterations=self.iterations, seed=self.seed)
+        return find_policy(self.policy).make(env, self.seed)
 
     def _draw(self, mission: Mission, flight: Flight, step: Callable[[str], None]) -> list[Path]:
         """Write the figures of one mission; return their paths."""

@@ -41,6 +41,8 @@ class Flight:
         states: (K + 1, 12) at the start and after each period, as in the observation.
         detected: (k, 4) spheres x, y, z, r in m, in order of detection.
         decision_ms: (K,) wall-clock time of each decision, ms.
+        interventions: periods in which a shield flew another reference than proposed; None for a policy whose memory
+            does not count them.
         trace: the same flight every tick.
     """
 
@@ -56,6 +58,7 @@ class Flight:
     states: NDArray[np.float64]
     detected: NDArray[np.float64]
     decision_ms: NDArray[np.float64]
+    interventions: int | None
     trace: Trace
 
     @property
@@ -94,6 +97,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         start, done = np.array([False]), terminated or truncated
     sent = np.array(references)
     trace = _trace(world, states[0], sent)
+    interventions = getattr(memory, "interventions", None)
     return Flight(
         scenario=world.scenario,
         outcome=info["outcome"],
@@ -107,6 +111,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         states=np.array(states),
         detected=observation["obstacles"][observation["obstacles"][:, 3] > 0.0],
         decision_ms=np.array(decisions),
+        interventions=None if interventions is None else int(np.sum(interventions)),
         trace=trace,
     )
 

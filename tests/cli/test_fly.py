@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from hydrone_gym import cli
-from hydrone_gym.cli import fly as fly_module
+from hydrone_gym.cli import compiling
 from hydrone_gym.evaluation import fly
+from hydrone_gym.evaluation.policies import find_policy
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario
 from planners import CLRRT
 
-EMPTY = ["fly", "--policy", "straight", "--obstacles", "0", "--no-figures"]
+EMPTY = ["fly", "--policy", "straight-line", "--obstacles", "0", "--no-figures"]
 
 
 def reject(constant):
@@ -58,8 +59,19 @@ def test_json_of_an_empty_world_is_finite(tmp_path, capsys):
     assert cli.main([*EMPTY, "--json", "--out", str(tmp_path)]) == 0
     document = json.loads(capsys.readouterr().out, parse_constant=reject)
     assert [record["clearance"] for record in document["flights"]] == [None, None]
-    assert document["policy"] == "straight"
+    assert document["policy"] == "straight-line"
     assert all(math.isfinite(record["planning_ms"]["p99"]) for record in document["flights"])
+
+
+def test_policies_are_those_of_an_evaluation(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drifting.py").write_text("from planners import StraightLine\nDrift = StraightLine.for_env\n")
+    times = []
+    for policy in ("straight-line", "drifting.py:Drift", "drift=drifting:Drift", "ppo-shield"):
+        options = ["fly", "--policy", policy, "--obstacles", "0", "--experiment", "1", "--no-figures", "--json"]
+        assert cli.main(options) == 0
+        times.append(json.loads(capsys.readouterr().out)["flights"][0]["time"])
+    assert times[0] == times[1] == times[2] != times[3]
 
 
 @pytest.fixture
@@ -73,7 +85,7 @@ def scenario_file(tmp_path):
 
 def test_a_mission_that_fails_gives_1(scenario_file, tmp_path, capsys):
     options = ["fly", "--scenario", str(scenario_file), "--no-figures", "--out", str(tmp_path / "out")]
-    assert cli.main([*options, "--policy", "straight"]) == 1
+    assert cli.main([*options, "--policy", "straight-line"]) == 1
     out = capsys.readouterr().out
     assert "COLLISION" in out
     assert "ball" in out
@@ -103,7 +115,8 @@ def test_vehicle_seed_and_obstacles_reach_the_environment(tmp_path, capsys):
     [
         (["--seed", "-1"], "--seed must not be negative, got -1"),
         (["--iterations", "5", "--time-budget", "0.1"], "--iterations and --time-budget exclude each other"),
-        (["--policy", "straight", "--iterations", "5"], "are options of --policy clrrt"),
+        (["--policy", "straight-line", "--iterations", "5"], "are options of --policy clrrt"),
+        (["--policy", "clrt"], "no policy 'clrt': known are clrrt,"),
         (["--iterations", "0"], "iterations must be a whole number of at least 1, got 0"),
         (["--time-budget", "-1"], "time_budget must be positive (s), got -1.0"),
         (["--obstacles", "-2"], "num_obstacles must be a whole number, not negative, got -2"),
@@ -115,7 +128,7 @@ def test_bad_input_gives_2_and_one_line(options, message, tmp_path, capsys):
     assert cli.main(["fly", "--out", str(tmp_path / "new"), *options]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    (line,) = [line for line in err.splitlines() if line != fly_module._COMPILING]
+    (line,) = [line for line in err.splitlines() if line != compiling.COMPILING]
     assert line.startswith("hydrone: error: ")
     assert message in line
     assert not (tmp_path / "new").exists()
@@ -142,18 +155,26 @@ def test_what_the_parser_refuses_gives_2(arguments, capsys):
 
 
 def test_compiling_is_announced_only_without_a_cache(tmp_path, monkeypatch, capsys):
-    for name in ("advance_rows", "cycle"):
-        kernel = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / name)))
-        monkeypatch.setattr(fly_module, name, kernel)
-    straight, clrrt = fly_module.Fly(policy="straight"), fly_module.Fly(policy="clrrt")
-    straight._announce_compiling()
-    assert capsys.readouterr().err == f"{fly_module._COMPILING}\n"
-    (tmp_path / "advance_rows").mkdir()
-    (tmp_path / "advance_rows" / "kernel.nbi").write_text("")
-    straight._announce_compiling()
-    assert capsys.readouterr().err == ""
-    clrrt._announce_compiling()
-    assert capsys.readouterr().err == f"{fly_module._COMPILING}\n"
+    found = {}
+    for name in ("advance_rows", "cycle", "guard"):
+        found[name] = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / name)))
+    monkeypatch.setattr(compiling, "advance_rows", found["advance_rows"])
+    monkeypatch.setattr(compiling, "_PARTS", {"CLRRT": found["cycle"], "shield": found["guard"]})
+
+    def announced(policy):
+        compiling.announce_compiling(*compiling.kernels_of(find_policy(policy)))
+        return capsys.readouterr().err == f"{compiling.COMPILING}\n"
+
+    policies = ("straight-line", "straight-line-shield", "clrrt", "clrrt-published", "ppo-shield")
+    assert all(map(announced, policies))
+    for name, needed in (
+        ("advance_rows", [False, True, True, True, True]),
+        ("guard", [False, False, True, True, False]),
+        ("cycle", [False] * 5),
+    ):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "kernel.nbi").write_text("")
+        assert [announced(policy) for policy in policies] == needed
 
 
 def test_the_installed_command(tmp_path):

@@ -1,0 +1,97 @@
+"""The subcommand `hydrone evaluate`: policies on the same worlds, rows, statistics and tables."""
+
+import json
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from hydrone_gym.cli.compiling import announce_compiling, kernels_of
+from hydrone_gym.evaluation.plan import Plan, make_plan
+from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
+from hydrone_gym.evaluation.results import write_results
+from hydrone_gym.evaluation.run import EvaluationStopped, carry_out
+from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, RunFolder
+from hydrone_gym.evaluation.tables import print_tables
+
+INTERRUPTED = 130  # what shells give for Ctrl-C
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate:
+    """Fly policies through the same worlds and say how they compare.
+
+    The same command again goes on where an evaluation was stopped.
+    """
+
+    suites: tuple[str, ...] = ("paper-20",)
+    """Frozen suites paper-20, dense-40, missions, density; or files or folders of your own scenarios."""
+    policies: tuple[str, ...] = DEFAULT_POLICIES
+    """Registered names, module:attribute, file.py:attribute or an agent's folder, each also as LABEL=…"""
+    worlds: int = 100
+    """First so many worlds of each mission."""
+    seed: int = 0
+    """Seed for policies that draw; the worlds are those of the suite."""
+    vehicle: Literal["paper", "physical"] = "paper"
+    """Parameter set of the vehicle."""
+    baseline: str | None = None
+    """Policy that the others are compared with; clrrt if it is among them, else the first."""
+    jobs: int | None = None
+    """Flights at once, as many as there are cores unless given."""
+    backend: str = "loky"
+    """Backend of joblib: loky, threading, dask, ray."""
+    out: Path | None = None
+    """Folder for rows.csv, summary.json and tables.md, evaluations/<suites> unless given; made if missing."""
+    overwrite: bool = False
+    """Begin anew in a folder that holds another evaluation."""
+    json: bool = False
+    """Print the summary as one JSON document instead of the tables, and show no progress bar."""
+
+    def run(self) -> int:
+        """Fly, report and return the exit code."""
+        try:
+            plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
+            baseline = self._baseline([policy.label for policy in plan.policies])
+            folder = RunFolder(self._folder(plan), plan.arguments(), overwrite=self.overwrite)
+        except (ValueError, OSError) as error:
+            print(f"hydrone: error: {error}", file=sys.stderr)
+            return 2
+        return self._fly(plan, folder, baseline)
+
+    def _fly(self, plan: Plan, folder: RunFolder, baseline: str) -> int:
+        """Carry the plan out, write and show what came of it, and return the exit code."""
+        began = time.perf_counter()
+        announce_compiling(*kernels_of(*plan.policies))
+        try:
+            records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
+            seconds = time.perf_counter() - began
+            document, tables = write_results(plan, records, folder.folder, baseline=baseline, seconds=seconds)
+        except (EvaluationStopped, OSError) as error:
+            print(f"hydrone: error: {error}", file=sys.stderr)
+            return 1
+        except ValueError as error:
+            print(f"hydrone: error: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("hydrone: interrupted; finished flights are kept, the same command goes on", file=sys.stderr)
+            return INTERRUPTED
+        if self.json:
+            print(json.dumps(document, indent=1, allow_nan=False))
+            return 0
+        print_tables(tables)
+        for name in (ROWS, SUMMARY, TABLES):
+            print(folder.folder / name)
+        return 0
+
+    def _baseline(self, labels: list[str]) -> str:
+        """Return the baseline; ValueError for one that does not fly."""
+        if self.baseline is None:
+            return "clrrt" if "clrrt" in labels else labels[0]
+        if self.baseline not in labels:
+            raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")
+        return self.baseline
+
+    def _folder(self, plan: Plan) -> Path:
+        names = "+".join(suite.name for suite in plan.suites)
+        return Path("evaluations") / names if self.out is None else self.out

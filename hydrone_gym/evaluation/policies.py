@@ -1,0 +1,210 @@
+"""Policies by name: where a factory is found from what a user writes, without importing planners or agents here.
+
+A factory takes the environment and returns a policy for it; one that also takes `seed` is given that of the
+evaluation. Packages register factories under the entry points `hydrone_gym.policies`, and readers of folders of trained
+agents, (folder, environment) -> policy, under `hydrone_gym.policy_folders`, by the name of a file in such a folder.
+"""
+
+import importlib
+import importlib.util
+import inspect
+import re
+import sys
+import traceback
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from hydrone_gym.evaluation.policy import Policy
+
+DEFAULT_POLICIES = (
+    "straight-line",
+    "straight-line-shield",
+    "potential-field",
+    "clrrt-published",
+    "clrrt",
+    "ppo",
+    "ppo-shield",
+)
+Factory = Callable[..., Policy]
+_NAMES, _FOLDERS = "hydrone_gym.policies", "hydrone_gym.policy_folders"
+_LABEL = re.compile(r"[\w.+-]+")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicySource:
+    """What a policy is made from; plain data that can be sent to another process.
+
+    Attributes:
+        label: what tables call it.
+        factory: "module:attribute", "/path/file.py:attribute", or the factory itself.
+        search: folder that modules are imported from besides those installed; empty for none.
+        folder: of a trained agent, handed to the factory before the environment; empty for none.
+    """
+
+    label: str
+    factory: str | Factory
+    search: str = ""
+    folder: str = ""
+
+    def make(self, env: Any, seed: int) -> Policy:
+        """Return a new policy for an environment.
+
+        Raises ValueError naming the policy when its factory cannot be found, fails in any way, or makes no policy.
+        """
+        try:
+            factory = load_factory(self.factory, self.search) if isinstance(self.factory, str) else self.factory
+            arguments = (self.folder, env) if self.folder else (env,)
+            policy = factory(*arguments, seed=seed) if _takes_seed(factory) else factory(*arguments)
+        except Exception as error:
+            raise ValueError(f"policy {self.label!r} cannot be made: {told(error)}") from error
+        if not callable(getattr(policy, "predict", None)):
+            got = type(policy).__name__
+            raise ValueError(f"policy {self.label!r}: its factory must return something with `predict`, got {got}")
+        return policy
+
+    @property
+    def origin(self) -> str:
+        """Where it comes from, for the record."""
+        factory = self.factory
+        if not isinstance(factory, str):
+            factory = f"{getattr(factory, '__module__', '?')}:{getattr(factory, '__qualname__', repr(factory))}"
+        return f"{factory} {self.folder}".strip()
+
+
+def known_policies() -> list[str]:
+    """Return the names that installed packages have registered."""
+    return sorted({entry.name for entry in entry_points(group=_NAMES)})
+
+
+def find_policy(text: str) -> PolicySource:
+    """Find what a user means by a policy.
+
+    Args:
+        text: a registered name, "module:attribute", "path/file.py:attribute", or the folder of a trained agent, each
+            also as "LABEL=…" to call it otherwise. Modules are sought in the current folder too.
+
+    Raises:
+        ValueError: a name that is not registered, or a module or attribute that cannot be loaded; the message says why.
+        FileNotFoundError: a file that does not exist.
+    """
+    before, _, after = text.partition("=")
+    label, given = (before, after) if after and _LABEL.fullmatch(before) else (text, text)
+    registered = [entry for entry in entry_points(group=_NAMES) if entry.name == given]
+    if registered:
+        return PolicySource(label=label, factory=_only(registered))
+    if Path(given).is_dir():
+        return PolicySource(label=label, factory=_reader(Path(given)), folder=str(Path(given).resolve()))
+    place, colon, attribute = given.rpartition(":")
+    if not colon or not place or not attribute:
+        raise ValueError(
+            f"no policy {given!r}: known are {', '.join(known_policies())}; "
+            "or give module:attribute, file.py:attribute, or the folder of a trained agent"
+        )
+    factory, search = given, str(Path.cwd())
+    if place.endswith(".py"):
+        factory, search = f"{Path(place).resolve()}:{attribute}", ""
+    load_factory(factory, search)
+    return PolicySource(label=label, factory=factory, search=search)
+
+
+def find_policies(policies: str | Iterable[str] | Mapping[str, str | Factory]) -> tuple[PolicySource, ...]:
+    """Find several policies; a mapping has labels as keys, and what `find_policy` takes or factories as values.
+
+    Raises ValueError for none, for a label twice, and as `find_policy` does.
+    """
+    if isinstance(policies, Mapping):
+        found = tuple(_labelled(label, value) for label, value in policies.items())
+    else:
+        found = tuple(find_policy(text) for text in ([policies] if isinstance(policies, str) else policies))
+    labels = [source.label for source in found]
+    if not labels or not all(label.isprintable() for label in labels):
+        raise ValueError(f"there must be at least one policy, and names without line breaks, got {labels}")
+    twice = sorted({label for label in labels if labels.count(label) > 1})
+    if twice:
+        raise ValueError(f"policies must have different names, got {', '.join(twice)} twice: write LABEL=… before one")
+    return found
+
+
+def _labelled(label: str, value: str | Factory) -> PolicySource:
+    if not _LABEL.fullmatch(label):
+        raise ValueError(f"a label must consist of letters, digits and . _ + -, got {label!r}")
+    return find_policy(f"{label}={value}") if isinstance(value, str) else PolicySource(label=label, factory=value)
+
+
+def _only(registered: list[EntryPoint]) -> str:
+    """Return where the one entry point of a name leads; ValueError if packages disagree."""
+    values = sorted({entry.value for entry in registered})
+    if len(values) > 1:
+        raise ValueError(f"policy {registered[0].name!r} is registered by several packages: {', '.join(values)}")
+    return values[0]
+
+
+def _reader(folder: Path) -> str:
+    """Return where the reader of an agent's folder is found, chosen by the files in the folder."""
+    readers = entry_points(group=_FOLDERS)
+    fitting = [entry for entry in readers if (folder / entry.name).is_file()]
+    if not fitting:
+        names = ", ".join(sorted({entry.name for entry in readers}))
+        raise ValueError(f"{folder}: not a trained agent: there must be a file {names}")
+    return _only(fitting)
+
+
+@cache
+def load_factory(path: str, search: str = "") -> Factory:
+    """Import what "module:attribute" or "file.py:attribute" names; ValueError says what is missing.
+
+    A module of a user may fail in any way when it is imported; that way is named.
+    """
+    place, _, attribute = path.rpartition(":")
+    if place.endswith(".py") and not Path(place).is_file():
+        raise FileNotFoundError(f"policy {path!r}: there is no file {place}")
+    try:
+        found: Any = _module_of(Path(place)) if place.endswith(".py") else _import(place, search)
+    except Exception as error:
+        raise ValueError(f"policy {path!r} cannot be imported: {type(error).__name__}: {error}") from error
+    for name in attribute.split("."):
+        if not hasattr(found, name):
+            raise ValueError(f"policy {path!r}: {getattr(found, '__name__', found)!r} has no attribute {name!r}")
+        found = getattr(found, name)
+    if not callable(found):
+        raise ValueError(f"policy {path!r} must be a callable that takes the environment, got {type(found).__name__}")
+    return found
+
+
+def _import(module: str, search: str) -> Any:
+    if search and search not in sys.path:
+        sys.path.append(search)  # last: a file of the user's must not stand in for an installed module
+    return importlib.import_module(module)
+
+
+def _module_of(file: Path) -> Any:
+    """Run a file as a module; what lies beside it can be imported from it."""
+    name = f"policy_{file.stem}_{zlib.crc32(str(file).encode()):08x}"
+    spec = importlib.util.spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and pickle look it up there
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))
+    spec.loader.exec_module(module)
+    return module
+
+
+def _takes_seed(factory: Factory) -> bool:
+    try:
+        return "seed" in inspect.signature(factory).parameters
+    except ValueError:  # some built-in callables have no signature
+        return False
+
+
+def told(error: BaseException) -> str:
+    """Return an error in one line: kind, message, and file and line it was raised in."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
+    return f"{type(error).__name__}: {error}{place}".replace("\n", " ")

@@ -1,0 +1,70 @@
+"""What a figure means nothing without: versions, commit and machine."""
+
+import hashlib
+import os
+import platform
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ("hydrone-gym", "numpy", "numba", "scipy", "gymnasium", "joblib")
+_SOURCE = Path(__file__).resolve().parent
+_ROOT = _SOURCE.parent.parent
+_PARTS = ("hydrone_gym", "planners", "agents")
+_KINDS = (".py", ".npz", ".yaml")  # code, and the weights of the agents
+
+
+def versions(packages: tuple[str, ...] = PACKAGES) -> dict[str, str]:
+    """Return the versions of Python and of some packages, "absent" for those that are not installed."""
+    found = {"python": platform.python_version()}
+    for package in packages:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "absent"
+    return found
+
+
+def commit() -> str | None:
+    """Return the commit of the sources, with "+" when they differ from it; None outside a checkout of this project."""
+    git = ["git", "-C", str(_SOURCE)]
+    try:
+        # an installed copy may lie in somebody else's repository
+        subprocess.run([*git, "ls-files", "--error-unmatch", "__init__.py"], capture_output=True, check=True)
+        name = subprocess.run([*git, "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True)
+        parts = [f":/{part}" for part in _PARTS]
+        command = [*git, "status", "--porcelain", "--untracked-files=no", "--", *parts]
+        changes = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return name.stdout.strip() + ("+" if changes.stdout.strip() else "")
+
+
+def sources() -> str:
+    """Return a hash of the code and the weights of this project, as they lie on the disk now."""
+    files = sorted(path for part in _PARTS for path in (_ROOT / part).rglob("*") if path.suffix in _KINDS)
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.relative_to(_ROOT).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def machine() -> dict[str, Any]:
+    """Return processor, cores this process may use, and system."""
+    return {"processor": _processor(), "cores": cores(), "system": f"{platform.system()} {platform.machine()}"}
+
+
+def cores() -> int:
+    """Return the number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

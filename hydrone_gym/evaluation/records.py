@@ -1,0 +1,199 @@
+"""The tidy record of a flight in an evaluation, one a (policy, world), and its line of CSV."""
+
+import csv
+import io
+import math
+import os
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from hydrone_gym.evaluation.flight import Flight
+from hydrone_gym.evaluation.statistics import percentiles
+from hydrone_gym.simulation.outcome import Outcome
+
+Key = tuple[str, str, int, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """One flight; None is an empty cell, where there is nothing to tell.
+
+    Attributes:
+        suite: name of the suite, with its version.
+        mission: name of the mission in it.
+        world: number of the world in the mission, from 0.
+        obstacles: spheres in that world.
+        policy: what the evaluation calls it.
+        outcome: name of an `Outcome`.
+        success: whether that is GOAL.
+        time: s.
+        energy: of the rotors' shafts, J.
+        length: of the path, m.
+        clearance: least distance of the vehicle's sphere to an obstacle, m; None without obstacles.
+        crossings: of the surface.
+        crossing_time: of the first one, s.
+        lateral_speed: largest at a crossing, m/s.
+        tilt: largest at a crossing, rad.
+        vertical_speed: largest at a crossing, either way, m/s.
+        interventions: periods in which a shield flew another reference; None without a shield.
+        episode_return: sum of rewards.
+        decisions: periods flown.
+        decision_ms_p50, decision_ms_p99, decision_ms_max: wall-clock time of a decision, ms. Only these differ from run
+            to run.
+    """
+
+    suite: str
+    mission: str
+    world: int
+    obstacles: int
+    policy: str
+    outcome: str
+    success: bool
+    time: float
+    energy: float
+    length: float
+    clearance: float | None
+    crossings: int
+    crossing_time: float | None
+    lateral_speed: float | None
+    tilt: float | None
+    vertical_speed: float | None
+    interventions: int | None
+    episode_return: float
+    decisions: int
+    decision_ms_p50: float
+    decision_ms_p99: float
+    decision_ms_max: float
+
+    @property
+    def key(self) -> Key:
+        """What tells it from every other record: suite, mission, world, policy."""
+        return self.suite, self.mission, self.world, self.policy
+
+
+COLUMNS = tuple(field.name for field in fields(Record))
+TIMING = tuple(name for name in COLUMNS if name.startswith("decision_ms"))
+HEADER = ",".join(COLUMNS)
+
+
+def record_of(key: Key, flight: Flight) -> Record:
+    """Sum up a flight."""
+    suite, mission, world, policy = key
+    crossings = flight.transitions
+    p50, p99, most = percentiles(flight.decision_ms, (50.0, 99.0, 100.0))
+
+    def largest(name: str) -> float | None:
+        return max((abs(float(crossing[name])) for crossing in crossings), default=None)
+
+    return Record(
+        suite=suite,
+        mission=mission,
+        world=world,
+        obstacles=len(flight.scenario.obstacles),
+        policy=policy,
+        outcome=flight.outcome.name,
+        success=flight.outcome is Outcome.GOAL,
+        time=float(flight.time),
+        energy=float(flight.energy),
+        length=flight.length,
+        clearance=float(flight.clearance) if math.isfinite(flight.clearance) else None,
+        crossings=len(crossings),
+        crossing_time=float(crossings[0]["time"]) if crossings else None,
+        lateral_speed=largest("lateral_speed"),
+        tilt=largest("tilt"),
+        vertical_speed=largest("vertical_speed"),
+        interventions=flight.interventions,
+        episode_return=flight.episode_return,
+        decisions=len(flight.decision_ms),
+        decision_ms_p50=p50 or 0.0,
+        decision_ms_p99=p99 or 0.0,
+        decision_ms_max=most or 0.0,
+    )
+
+
+def to_line(record: Record) -> str:
+    """Return the line of CSV, line break included; floats in full, so that reading gives the same record."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerow(_cell(getattr(record, name)) for name in COLUMNS)
+    return stream.getvalue()
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return str(int(value)) if isinstance(value, bool) else str(value)  # str of a float restores it bit for bit
+
+
+def from_line(line: str) -> Record:
+    """Read a line of CSV; ValueError names the column and what is wrong there."""
+    cells = next(csv.reader([line], strict=True), [])
+    if len(cells) != len(COLUMNS):
+        raise ValueError(f"there must be {len(COLUMNS)} cells, got {len(cells)}")
+    values = {}
+    for field, cell in zip(fields(Record), cells, strict=True):
+        try:
+            values[field.name] = _READERS[field.type](cell)
+        except ValueError as error:
+            raise ValueError(f"column {field.name}: {error}") from None
+    if values["outcome"] not in Outcome.__members__ or values["success"] != (values["outcome"] == Outcome.GOAL.name):
+        raise ValueError(f"column outcome: {values['outcome']!r} does not fit success {int(values['success'])}")
+    return Record(**values)
+
+
+def _integer(cell: str) -> int:
+    if not cell.isascii() or not cell.isdigit():
+        raise ValueError(f"must be a whole number, got {cell!r}")
+    return int(cell)
+
+
+def _flag(cell: str) -> bool:
+    if cell not in ("0", "1"):
+        raise ValueError(f"must be 0 or 1, got {cell!r}")
+    return cell == "1"
+
+
+def _number(cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"must be a number, got {cell!r}")
+    return value
+
+
+_READERS: dict[Any, Any] = {
+    str: str,
+    int: _integer,
+    bool: _flag,
+    float: _number,
+    int | None: lambda cell: _integer(cell) if cell else None,
+    float | None: lambda cell: _number(cell) if cell else None,
+}
+
+
+def read_records(path: str | os.PathLike[str]) -> list[Record]:
+    """Read the rows that an evaluation wrote.
+
+    A last line without its line break, cut off when the evaluation was killed, is left out.
+
+    Raises:
+        ValueError: any other damage, naming file, line and column.
+        OSError: a file that cannot be read.
+    """
+    return parse_records(Path(path).read_bytes(), os.fspath(path))
+
+
+def parse_records(content: bytes, name: str) -> list[Record]:
+    """Turn the bytes of a file of rows into records; `name` is what errors call the file."""
+    lines = content.split(b"\n")[:-1]
+    if lines and lines[0] != HEADER.encode():
+        raise ValueError(f"{name}, line 1: must name the columns {HEADER}")
+    records = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            records.append(from_line(line.decode()))
+        except (ValueError, csv.Error) as error:
+            raise ValueError(f"{name}, line {number}: {error}") from None
+    return records

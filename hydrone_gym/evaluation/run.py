@@ -1,0 +1,154 @@
+"""Carrying an evaluation out: jobs to the workers, rows to the disk, and what happens when something stops it."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hydrone_gym.evaluation.backends import runner
+from hydrone_gym.evaluation.jobs import Failure, fly_job
+from hydrone_gym.evaluation.plan import Plan, PoliciesLike, SuiteLike, make_plan
+from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
+from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.run_folder import RunFolder
+
+
+class EvaluationStopped(RuntimeError):
+    """An evaluation ended before its last flight; `records` are those that were finished, also on disk."""
+
+    def __init__(self, message: str, records: list[Record]) -> None:
+        """Keep what was finished."""
+        super().__init__(message)
+        self.records = records
+
+
+def evaluate(
+    suites: SuiteLike | Sequence[SuiteLike] = "paper-20",
+    policies: PoliciesLike = DEFAULT_POLICIES,
+    *,
+    worlds: int | None = 100,
+    seed: int = 0,
+    vehicle: str = "paper",
+    jobs: int | None = None,
+    backend: str | None = None,
+    out: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    progress: bool = False,
+) -> list[Record]:
+    """Fly policies through the same worlds and return one record a flight.
+
+    Records are the same, times of decisions aside, whatever backend and number of jobs.
+
+    Args:
+        suites: names of frozen suites, files or folders of your own (see `load_suite`), or `Suite` objects.
+        policies: registered names, "module:attribute", "file.py:attribute", folders of trained agents (see
+            `find_policy`), or a mapping from labels to these or to factories, callables that take the environment.
+        worlds: the first so many of each mission, None for all.
+        seed: given to policies that draw; every flight starts with it anew.
+        vehicle: parameter set, "paper" or "physical".
+        jobs: flights at once.
+        backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
+            this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
+        out: folder to write rows to as they are finished; an evaluation with the same arguments that was stopped there
+            goes on where it was.
+        overwrite: begin anew in that folder whatever it holds.
+        progress: show a bar with the time left on stderr.
+
+    Raises:
+        ValueError, TypeError, FileNotFoundError: an argument out of range, an unknown suite or policy, a folder with
+            another evaluation, damaged rows.
+        EvaluationStopped: a policy raised in a flight, a worker died, or the disk is full. Finished rows are kept.
+    """
+    plan = make_plan(suites, policies, worlds=worlds, seed=seed, vehicle=vehicle)
+    folder = None if out is None else RunFolder(Path(out), plan.arguments(), overwrite=overwrite)
+    return carry_out(plan, folder, jobs=jobs, backend=backend, progress=progress)
+
+
+def carry_out(
+    plan: Plan,
+    folder: RunFolder | None = None,
+    *,
+    jobs: int | None = None,
+    backend: str | None = None,
+    progress: bool = False,
+) -> list[Record]:
+    """Fly what of a plan is not finished yet in a folder; arguments, result and errors as for `evaluate`."""
+    keys = plan.keys()
+    records = [] if folder is None else folder.finished(keys)
+    if len(records) == len(keys):
+        return records
+    plan.check()
+    with (
+        runner(backend, jobs) as run,
+        _bar(len(keys), len(records), progress) as advance,
+        contextlib.closing(run(_calls(plan, len(records)))) as results,
+    ):
+        while len(records) < len(keys):
+            failure = _take(results, records, folder, len(keys))
+            advance(len(records))
+            if failure is not None:
+                raise _stopped_by(failure, records, len(keys), folder)
+    return records
+
+
+def _calls(plan: Plan, done: int) -> Iterator[Any]:
+    """Yield what joblib is to call: the jobs of a plan without its first `done` flights."""
+    import joblib
+
+    for job in plan.jobs():
+        skipped = min(done, len(job.worlds))
+        done -= skipped
+        if skipped < len(job.worlds):
+            yield joblib.delayed(fly_job)(replace(job, worlds=job.worlds[skipped:]))
+
+
+def _take(results: Iterator[Any], records: list[Record], folder: RunFolder | None, total: int) -> Failure | None:
+    """Add the rows of the next job to `records` and to the folder; return what cut the job short, None if nothing did.
+
+    Raises EvaluationStopped when the workers or the disk fail.
+    """
+    try:
+        finished, failure = next(results)
+    except Exception as error:  # a backend's own: a worker killed, a cluster lost, a policy that cannot be sent
+        kind = type(error).__name__
+        raise EvaluationStopped(f"workers failed: {kind}: {error}; {_kept(records, total, folder)}", records) from error
+    if folder is not None:
+        try:
+            folder.append(finished)
+        except OSError as error:
+            raise EvaluationStopped(f"{error}; {_kept(records, total, folder)}", records) from error
+    records += finished
+    return failure
+
+
+def _stopped_by(failure: Failure, records: list[Record], total: int, folder: RunFolder | None) -> EvaluationStopped:
+    """Return the error that names policy, mission and world of a flight that failed."""
+    suite, mission, world, policy = failure.key
+    where = f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}"
+    stopped = EvaluationStopped(f"{where}: {failure.reason}; {_kept(records, total, folder)}", records)
+    stopped.add_note(failure.details)
+    return stopped
+
+
+def _kept(records: list[Record], total: int, folder: RunFolder | None) -> str:
+    """Say what was finished."""
+    place = "" if folder is None else f" and kept in {folder.rows}; the same evaluation goes on from there"
+    return f"{len(records)} of {total} flights are finished{place}"
+
+
+@contextlib.contextmanager
+def _bar(total: int, done: int, shown: bool) -> Iterator[Callable[[int], None]]:
+    """Show a bar on stderr where that is a terminal; yields a function that takes the number of finished flights."""
+    if not shown or not sys.stderr.isatty():
+        yield lambda finished: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = ("flights", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), "left", TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total, completed=done)
+        yield lambda finished: bar.update(task, completed=finished)

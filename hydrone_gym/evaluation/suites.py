@@ -1,0 +1,189 @@
+"""Scenario suites: the worlds that policies are compared on, frozen by name and version or made by the user."""
+
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym.world.scenario import Scenario, load_scenario
+
+FOLDER = Path(__file__).parent / "suite_data"
+# Stored worlds do not follow the random stream of a later NumPy; a change of the worlds is a new version.
+SHA256 = {
+    "paper-20-v1": "2cd1f0d8df8f4fcc51b81c98ffbb4d39a98977b2fb5725a5020be7a4e7d74b46",
+    "dense-40-v1": "7f6ce81f26cf1542651a6e6c86c0d491c85422224666cb9af810efe7c078289a",
+    "missions-v1": "72fe7b6e597693931841108dfa61107687b3401fb704cacccc65670575a7acc9",
+    "density-v1": "bb01d4f06de6be8501bb4fc11780bb3f9095c7656e5854dd7d5cd5c024b35238",
+}
+_PARTS = ("start", "goal", "obstacles")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mission:
+    """Scenarios of one kind and the environment they are flown in.
+
+    Attributes:
+        name: what tables call it.
+        env_id: registered id of the environment.
+        options: keyword options of that environment, plain data; "vehicle" and "interface" are not among them.
+        scenarios: the worlds; world k of the mission is entry k.
+
+    Raises:
+        ValueError: no scenario, or an option that belongs to the evaluation.
+    """
+
+    name: str
+    env_id: str
+    options: Mapping[str, Any]
+    scenarios: tuple[Scenario, ...]
+
+    def __post_init__(self) -> None:
+        """Check what would fail later, far from its cause."""
+        if not self.scenarios:
+            raise ValueError(f"mission {self.name!r} must have at least one scenario")
+        taken = sorted({"vehicle", "interface", "render_mode"} & self.options.keys())
+        if taken:
+            raise ValueError(f"mission {self.name!r} must leave option {', '.join(taken)} to the evaluation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suite:
+    """Missions under one name.
+
+    Attributes:
+        name: what tables call it, for a frozen suite with its version.
+        missions: each with a name of its own.
+
+    Raises:
+        ValueError: no mission, or two of one name.
+    """
+
+    name: str
+    missions: tuple[Mission, ...]
+
+    def __post_init__(self) -> None:
+        """Check that rows can tell the missions apart."""
+        names = [mission.name for mission in self.missions]
+        if not names or len(set(names)) < len(names):
+            raise ValueError(f"suite {self.name!r} must have missions with different names, got {names}")
+
+    @classmethod
+    def drawn(
+        cls, env_id: str, seeds: Iterable[int], options: Mapping[str, Any] | None = None, *, name: str = "drawn"
+    ) -> Self:
+        """Return a suite of one mission: the worlds that an environment draws from these seeds.
+
+        Args:
+            env_id: registered id.
+            seeds: one a world. Training uses seeds below 10,000,000.
+            options: keyword options of the environment.
+            name: of the suite; the mission is called by the environment's id.
+        """
+        import gymnasium as gym
+
+        env, scenarios = gym.make(env_id, **(options or {})), []
+        for seed in seeds:
+            env.reset(seed=seed)
+            scenarios.append(env.get_wrapper_attr("scenario"))
+        env.close()
+        mission = Mission(name=env_id, env_id=env_id, options=dict(options or {}), scenarios=tuple(scenarios))
+        return cls(name=name, missions=(mission,))
+
+    def first(self, worlds: int) -> Self:
+        """Return the suite with the first so many worlds of each mission, or all where there are fewer."""
+        return replace(self, missions=tuple(replace(m, scenarios=m.scenarios[:worlds]) for m in self.missions))
+
+    def fingerprint(self) -> str:
+        """Return a hash of what is flown: missions, options and every number of every scenario."""
+        digest = hashlib.sha256()
+        for mission in self.missions:
+            digest.update(json.dumps([mission.name, mission.env_id, dict(mission.options)], sort_keys=True).encode())
+            for scenario in mission.scenarios:
+                digest.update(np.array([*scenario.start, *scenario.goal]).tobytes() + scenario.obstacles.tobytes())
+        return digest.hexdigest()[:16]
+
+
+def frozen_suites() -> list[str]:
+    """Return the names of the suites in the package, with their versions."""
+    return sorted(SHA256)
+
+
+def load_suite(name_or_path: str | os.PathLike[str]) -> Suite:
+    """Return a frozen suite, or one of your own from a file or a folder.
+
+    Args:
+        name_or_path: "paper-20" for its newest version, "paper-20-v1" for that one; the path of a file that
+            `save_suite` wrote; or a folder of scenario files, one mission, or of such folders, a mission each.
+
+    Raises:
+        FileNotFoundError: none of these; the message lists the frozen suites.
+        ValueError: a damaged file, or a folder without scenarios.
+    """
+    name, path = os.fspath(name_or_path), Path(name_or_path)
+    versions = [frozen for frozen in frozen_suites() if name in (frozen, frozen.rpartition("-v")[0])]
+    if versions:
+        newest = max(versions, key=lambda frozen: int(frozen.rpartition("-v")[2]))
+        path = FOLDER / f"{newest}.npz"
+        found = hashlib.sha256(path.read_bytes()).hexdigest()
+        if found != SHA256[newest]:
+            raise ValueError(f"{path}: the frozen suite is damaged, its SHA-256 is {found}, not {SHA256[newest]}")
+        return _read(path)
+    if path.is_dir():
+        return _from_folder(path)
+    if path.is_file():
+        return _read(path)
+    raise FileNotFoundError(f"no suite {name!r}: frozen are {', '.join(frozen_suites())}; or give a file or a folder")
+
+
+def _from_folder(folder: Path) -> Suite:
+    """Read the scenario files of a folder and of the folders in it, in the order of their names."""
+    missions = []
+    for place in [folder, *sorted(entry for entry in folder.iterdir() if entry.is_dir())]:
+        scenarios = tuple(load_scenario(file) for file in sorted(place.glob("*.json")))
+        if scenarios:
+            options = {"num_obstacles": max(len(scenario.obstacles) for scenario in scenarios)}
+            name = place.resolve().name
+            missions.append(Mission(name=name, env_id="HydroneGym/Mission-v0", options=options, scenarios=scenarios))
+    if not missions:
+        raise ValueError(f"{folder}: no scenario files (*.json), neither here nor one folder down")
+    return Suite(name=folder.resolve().name, missions=tuple(missions))
+
+
+def save_suite(suite: Suite, path: str | os.PathLike[str]) -> None:
+    """Write a suite to an NPZ file that `load_suite` reads; every float is restored bit for bit, nothing is pickled.
+
+    Raises ValueError where scenarios of one mission have different numbers of spheres, OSError if writing fails.
+    """
+    arrays: dict[str, NDArray] = {}
+    described = []
+    for mission in suite.missions:
+        described.append({"name": mission.name, "env_id": mission.env_id, "options": dict(mission.options)})
+        if len({len(scenario.obstacles) for scenario in mission.scenarios}) > 1:
+            raise ValueError(f"scenarios of mission {mission.name!r} must have equally many spheres to be saved")
+        for part in _PARTS:
+            arrays[f"{mission.name}/{part}"] = np.array([getattr(scenario, part) for scenario in mission.scenarios])
+    arrays["suite"] = np.array(json.dumps({"name": suite.name, "missions": described}))
+    with open(path, "wb") as stream:
+        np.savez(stream, allow_pickle=False, **arrays)
+
+
+def _read(path: Path) -> Suite:
+    """Read a file that `save_suite` wrote."""
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            content = json.loads(str(arrays["suite"]))
+            missions = []
+            for described in content["missions"]:
+                columns = (arrays[f"{described['name']}/{part}"] for part in _PARTS)
+                scenarios = tuple(Scenario(**dict(zip(_PARTS, row, strict=True))) for row in zip(*columns, strict=True))
+                missions.append(Mission(**described, scenarios=scenarios))
+            return Suite(name=content["name"], missions=tuple(missions))
+    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path}: not a suite file: {error}") from None

@@ -1,0 +1,194 @@
+"""An evaluation in numbers: each policy on each mission, ranked, and how it differs from a baseline on equal worlds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, paired_success, wilson_interval
+from hydrone_gym.simulation.outcome import Outcome
+
+ALL_MISSIONS = "all missions"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicySummary:
+    """One policy on the worlds of a mission.
+
+    Attributes:
+        policy: its name.
+        rank: from 1, by success, then by time.
+        worlds: flights.
+        success: share that arrived, with the 95 % Wilson interval.
+        collisions, rough_crossings, timeouts, out_of_bounds, diverged: flights that ended so.
+        time, length, energy: s, m and J of the flights that arrived: interquartile mean and 95 % bootstrap interval;
+            None if none did.
+        clearance: least distance to an obstacle over all flights, m; None without obstacles.
+        lateral_speed, tilt: largest at a crossing over all flights, m/s and rad; None without crossings.
+        interventions: of the shield, mean a flight; None without a shield.
+        decision_ms_p50, decision_ms_p99: medians over flights of each flight's percentile, ms.
+    """
+
+    policy: str
+    rank: int
+    worlds: int
+    success: Estimate
+    collisions: int
+    rough_crossings: int
+    timeouts: int
+    out_of_bounds: int
+    diverged: int
+    time: Estimate | None
+    length: Estimate | None
+    energy: Estimate | None
+    clearance: float | None
+    lateral_speed: float | None
+    tilt: float | None
+    interventions: float | None
+    decision_ms_p50: float
+    decision_ms_p99: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A policy against the baseline on the worlds that both flew; differences are the policy's less the baseline's.
+
+    Attributes:
+        policy: its name.
+        worlds: that both flew.
+        success: difference of the success rates with Newcombe's 95 % interval for pairs.
+        only_policy, only_baseline: worlds in which one alone arrived.
+        p_value: of McNemar's exact test, two-sided.
+        both: worlds in which both arrived.
+        time, energy: interquartile mean of the differences over those, s and J, with 95 % bootstrap interval; None if
+            there are none.
+    """
+
+    policy: str
+    worlds: int
+    success: Estimate
+    only_policy: int
+    only_baseline: int
+    p_value: float
+    both: int
+    time: Estimate | None
+    energy: Estimate | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissionSummary:
+    """All policies on one mission of a suite, or on all its missions together.
+
+    Attributes:
+        suite: its name.
+        mission: its name, or `ALL_MISSIONS`.
+        baseline: policy that the others are compared with.
+        policies: by rank.
+        comparisons: every other policy with the baseline, by rank.
+    """
+
+    suite: str
+    mission: str
+    baseline: str
+    policies: tuple[PolicySummary, ...]
+    comparisons: tuple[Comparison, ...]
+
+
+def summarise(records: Sequence[Record], baseline: str | None = None) -> list[MissionSummary]:
+    """Sum up an evaluation, finished or not.
+
+    Args:
+        records: in any order.
+        baseline: policy to compare with; the first one of the records unless given.
+
+    Returns:
+        For each suite its missions in the order of the records, then all of them together if they are several.
+
+    Raises:
+        ValueError: a baseline that is not among the policies.
+    """
+    policies = list(dict.fromkeys(record.policy for record in records))
+    if baseline is not None and baseline not in policies:
+        raise ValueError(f"baseline must be one of {', '.join(policies)}, got {baseline!r}")
+    summaries = []
+    for suite in dict.fromkeys(record.suite for record in records):
+        within = [record for record in records if record.suite == suite]
+        missions = list(dict.fromkeys(record.mission for record in within))
+        groups = [(name, [record for record in within if record.mission == name]) for name in missions]
+        if len(missions) > 1:
+            groups.append((ALL_MISSIONS, within))
+        summaries += [_mission(suite, name, group, baseline or policies[0]) for name, group in groups]
+    return summaries
+
+
+def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str) -> MissionSummary:
+    flown = {name: [r for r in records if r.policy == name] for name in dict.fromkeys(r.policy for r in records)}
+    ranked = sorted(flown, key=lambda name: _order(flown[name]))
+    compared = {(record.mission, record.world): record for record in flown.get(baseline, [])}
+    pairs = {
+        name: [(r, compared[r.mission, r.world]) for r in flown[name] if (r.mission, r.world) in compared]
+        for name in ranked
+        if name != baseline
+    }
+    return MissionSummary(
+        suite=suite,
+        mission=mission,
+        baseline=baseline,
+        policies=tuple(_policy(name, rank, flown[name]) for rank, name in enumerate(ranked, start=1)),
+        comparisons=tuple(_comparison(name, same_worlds) for name, same_worlds in pairs.items() if same_worlds),
+    )
+
+
+def _order(records: Sequence[Record]) -> tuple[float, float]:
+    """What policies are ranked by: more success first, then less time."""
+    arrived = [record.time for record in records if record.success]
+    return -len(arrived) / len(records), interquartile_mean(arrived).value if arrived else np.inf
+
+
+def _policy(name: str, rank: int, records: Sequence[Record]) -> PolicySummary:
+    arrived = [record for record in records if record.success]
+    low, high = wilson_interval(len(arrived), len(records))
+    outcomes = [record.outcome for record in records]
+    interventions = [record.interventions for record in records if record.interventions is not None]
+    return PolicySummary(
+        policy=name,
+        rank=rank,
+        worlds=len(records),
+        success=Estimate(len(arrived) / len(records), low, high),
+        collisions=outcomes.count(Outcome.COLLISION.name),
+        rough_crossings=outcomes.count(Outcome.ROUGH_TRANSITION.name),
+        timeouts=outcomes.count(Outcome.TIMEOUT.name),
+        out_of_bounds=outcomes.count(Outcome.OUT_OF_BOUNDS.name),
+        diverged=outcomes.count(Outcome.DIVERGED.name),
+        time=_estimate([record.time for record in arrived]),
+        length=_estimate([record.length for record in arrived]),
+        energy=_estimate([record.energy for record in arrived]),
+        clearance=min((r.clearance for r in records if r.clearance is not None), default=None),
+        lateral_speed=max((r.lateral_speed for r in records if r.lateral_speed is not None), default=None),
+        tilt=max((r.tilt for r in records if r.tilt is not None), default=None),
+        interventions=float(np.mean(interventions)) if interventions else None,
+        decision_ms_p50=float(np.median([record.decision_ms_p50 for record in records])),
+        decision_ms_p99=float(np.median([record.decision_ms_p99 for record in records])),
+    )
+
+
+def _comparison(name: str, pairs: Sequence[tuple[Record, Record]]) -> Comparison:
+    """Compare a policy with the baseline, given the records of both for each world."""
+    paired = paired_success([one.success for one, _ in pairs], [other.success for _, other in pairs])
+    both = [(one, other) for one, other in pairs if one.success and other.success]
+    return Comparison(
+        policy=name,
+        worlds=len(pairs),
+        success=paired.difference,
+        only_policy=paired.only_first,
+        only_baseline=paired.only_second,
+        p_value=paired.p_value,
+        both=len(both),
+        time=_estimate([one.time - other.time for one, other in both]),
+        energy=_estimate([one.energy - other.energy for one, other in both]),
+    )
+
+
+def _estimate(values: Sequence[float]) -> Estimate | None:
+    return interquartile_mean(values) if values else None

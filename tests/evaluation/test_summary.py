@@ -1,0 +1,154 @@
+"""Summaries and tables against sums by hand over records made up for it."""
+
+import statistics
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hydrone_gym.evaluation.statistics import interquartile_mean, wilson_interval
+from hydrone_gym.evaluation.summary import ALL_MISSIONS, summarise
+from hydrone_gym.evaluation.tables import markdown, print_tables, tables_of
+from tests.evaluation.test_records import ROW
+
+ENDS = ("GOAL", "COLLISION", "ROUGH_TRANSITION", "TIMEOUT", "OUT_OF_BOUNDS", "DIVERGED")
+
+
+def record(policy, world, outcome="GOAL", time=20.0, mission="m", **changes):
+    changed = {"clearance": 0.5, "policy": policy, "world": world, "mission": mission, "time": time, **changes}
+    return replace(ROW, outcome=outcome, success=outcome == "GOAL", **changed)
+
+
+@pytest.fixture
+def records():
+    """Sixty worlds: "quick" loses some of every kind, "safe" arrives slowly, "lost" never."""
+    random = np.random.default_rng(3)
+    ends = random.choice(ENDS, 60, p=(0.7, 0.1, 0.05, 0.05, 0.05, 0.05))
+    rows = []
+    for world, end in enumerate(ends):
+        quick = {"energy": random.normal(900.0, 50.0), "clearance": random.normal(0.3, 0.2)}
+        rows.append(record("quick", world, str(end), 19.0 + random.random(), **quick))
+        rows.append(record("safe", world, "GOAL", 21.0 + random.random(), interventions=world % 3))
+        rows.append(record("lost", world, "TIMEOUT", 120.0, crossings=0, lateral_speed=None, tilt=None, clearance=None))
+    return rows
+
+
+def test_a_policy_is_summed_up(records):
+    (summary,) = summarise(records)
+    flown = [row for row in records if row.policy == "quick"]
+    (quick,) = [entry for entry in summary.policies if entry.policy == "quick"]
+    arrived = [row for row in flown if row.outcome == "GOAL"]
+    assert quick.worlds == 60
+    assert quick.success == (len(arrived) / 60, *wilson_interval(len(arrived), 60))
+    counted = (quick.collisions, quick.rough_crossings, quick.timeouts, quick.out_of_bounds, quick.diverged)
+    assert counted == tuple(sum(row.outcome == end for row in flown) for end in ENDS[1:])
+    assert len(arrived) + sum(counted) == 60
+    for name in ("time", "energy", "length"):
+        assert getattr(quick, name) == interquartile_mean([getattr(row, name) for row in arrived])
+    assert quick.clearance == min(row.clearance for row in flown)
+    assert quick.lateral_speed == ROW.lateral_speed
+    assert quick.interventions is None
+    assert quick.decision_ms_p99 == ROW.decision_ms_p99
+
+
+def test_what_there_is_none_of_is_none(records):
+    (lost,) = [entry for entry in summarise(records)[0].policies if entry.policy == "lost"]
+    assert lost.success.value == 0.0
+    assert lost.success.low == 0.0
+    assert [lost.time, lost.length, lost.energy, lost.clearance, lost.lateral_speed, lost.tilt] == [None] * 6
+    (safe,) = [entry for entry in summarise(records)[0].policies if entry.policy == "safe"]
+    assert safe.interventions == statistics.fmean(world % 3 for world in range(60))
+
+
+def test_policies_rank_by_success_then_time():
+    rows = [record("slow", world, time=30.0) for world in range(4)]
+    rows += [record("fast", world, time=20.0) for world in range(4)]
+    rows += [record("fails", world, "GOAL" if world else "COLLISION", time=10.0) for world in range(4)]
+    rows += [record("never", world, "TIMEOUT") for world in range(4)]
+    (summary,) = summarise(rows)
+    assert [(p.rank, p.policy) for p in summary.policies] == [(1, "fast"), (2, "slow"), (3, "fails"), (4, "never")]
+
+
+def test_a_comparison_is_over_the_same_worlds(records):
+    shuffled = [records[k] for k in np.random.default_rng(0).permutation(len(records))]
+    (summary,) = summarise(shuffled, baseline="quick")
+    (safe,) = [entry for entry in summary.comparisons if entry.policy == "safe"]
+    quick = {row.world: row for row in records if row.policy == "quick"}
+    differences = [
+        row.time - quick[row.world].time for row in records if row.policy == "safe" and quick[row.world].success
+    ]
+    failed = sum(not row.success for row in quick.values())
+    assert (safe.worlds, safe.both, safe.only_policy, safe.only_baseline) == (60, 60 - failed, failed, 0)
+    assert safe.success.value == pytest.approx(failed / 60)
+    assert safe.time.value == pytest.approx(interquartile_mean(differences).value)
+    assert 1.0 < safe.time.low < safe.time.value < safe.time.high < 3.0
+    (lost,) = [entry for entry in summary.comparisons if entry.policy == "lost"]
+    assert (lost.both, lost.time, lost.energy) == (0, None, None)
+
+
+def test_missions_are_told_apart_and_pooled():
+    rows = [record(name, world, mission=mission) for mission in ("b", "a") for world in range(3) for name in ("x", "y")]
+    rows += [replace(row, suite="other", mission="a") for row in rows[:2]]
+    found = [(s.suite, s.mission, s.policies[0].worlds) for s in summarise(rows)]
+    assert found == [
+        (ROW.suite, "b", 3),
+        (ROW.suite, "a", 3),
+        (ROW.suite, ALL_MISSIONS, 6),
+        ("other", "a", 1),
+    ]
+
+
+def test_worlds_of_different_missions_are_no_pair():
+    rows = [record("x", 0, mission="a", time=10.0), record("x", 0, mission="b", time=20.0)]
+    rows += [record("y", 0, mission="a", time=11.0), record("y", 0, mission="b", time=22.0)]
+    pooled = summarise(rows)[-1]
+    assert pooled.comparisons[0].time.value == 1.5
+
+
+def test_an_unfinished_evaluation_compares_what_there_is(records):
+    (summary,) = summarise(records[:-2])
+    assert {c.policy: c.worlds for c in summary.comparisons} == {"safe": 59, "lost": 59}
+    first = summarise([record("x", 0), record("y", 1)])[0]
+    assert first.comparisons == ()
+
+
+def test_an_unknown_baseline_is_refused(records):
+    with pytest.raises(ValueError, match="baseline must be one of quick, safe, lost, got 'quik'"):
+        summarise(records, baseline="quik")
+
+
+def test_tables_show_the_figures(records, capsys):
+    summaries = summarise(records)
+    outcomes, measures, differences = tables_of(summaries)
+    (quick,) = [entry for entry in summaries[0].policies if entry.policy == "quick"]
+    assert outcomes.rows[0][:3] == ("1. safe", "60", "100.0 [94.0, 100.0]")
+    assert outcomes.rows[1][:2] == ("2. quick", "60")
+    assert outcomes.rows[1][3:] == (
+        *map(str, (quick.collisions, quick.rough_crossings, quick.timeouts, quick.out_of_bounds + quick.diverged)),
+        "-",
+    )
+    assert measures.rows[2] == ("lost", "-", "-", "-", "-", "1.50 / 9.50")
+    time = summaries[0].comparisons[0].time
+    assert differences.rows[0][5] == f"{time.value:+.2f} [{time.low:+.2f}, {time.high:+.2f}]"
+    text = markdown([outcomes, measures, differences])
+    lines = text.splitlines()
+    assert lines.count("| 1. safe | 60 | 100.0 [94.0, 100.0] | 0 | 0 | 0 | 0 | 1.0 |") == 1
+    for line in lines:
+        assert not line or line.startswith(("| ", "### ", "|---|"))
+    print_tables([outcomes, measures, differences])
+    shown = capsys.readouterr().out
+    for table in (outcomes, measures, differences):
+        for row in table.rows:
+            assert any(all(cell in line for cell in row) for line in shown.splitlines())
+    assert all(len(line) <= 120 for line in shown.splitlines())
+
+
+def test_markdown_escapes_what_would_break_a_table():
+    (summary,) = summarise([record("a|b", 0), record("[red]c", 0)])
+    outcomes = tables_of([summary])[0]
+    assert "| 1. a\\|b | 1 |" in markdown([outcomes])
+
+
+def test_names_are_not_taken_for_markup(capsys):
+    print_tables(tables_of(summarise([record("[red]c", 0)])))
+    assert "1. [red]c" in capsys.readouterr().out
