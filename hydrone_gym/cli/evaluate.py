@@ -7,13 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from gymnasium.error import DependencyNotInstalled
+
 from hydrone_gym.cli.compiling import announce_compiling, kernels_of
+from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
+from hydrone_gym.evaluation.replays import Writer
 from hydrone_gym.evaluation.results import write_results
 from hydrone_gym.evaluation.run import EvaluationStopped, carry_out
 from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, RunFolder
 from hydrone_gym.evaluation.tables import print_tables
+from hydrone_gym.rendering.replay import load_viser, write_replay
 
 INTERRUPTED = 130  # what shells give for Ctrl-C
 
@@ -43,6 +48,10 @@ class Evaluate:
     """Backend of joblib: loky, threading, dask, ray."""
     out: Path | None = None
     """Folder for rows.csv, summary.json and tables.md, evaluations/<suites> unless given; made if missing."""
+    report: Path | None = None
+    """Folder for report.html: tables, figures, and replays of the best, median and worst flight of each policy."""
+    no_replays: bool = False
+    """Leave the replays out of the report."""
     overwrite: bool = False
     """Begin anew in a folder that holds another evaluation."""
     json: bool = False
@@ -54,6 +63,8 @@ class Evaluate:
             plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
             baseline = self._baseline([policy.label for policy in plan.policies])
             folder = RunFolder(self._folder(plan), plan.arguments(), overwrite=self.overwrite)
+            if self.report is not None:
+                self.report.mkdir(parents=True, exist_ok=True)
         except (ValueError, OSError) as error:
             print(f"hydrone: error: {error}", file=sys.stderr)
             return 2
@@ -67,6 +78,7 @@ class Evaluate:
             records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
             seconds = time.perf_counter() - began
             document, tables = write_results(plan, records, folder.folder, baseline=baseline, seconds=seconds)
+            pages = [] if self.report is None else [self._report(plan, folder.folder, self.report)]
         except (EvaluationStopped, OSError) as error:
             print(f"hydrone: error: {error}", file=sys.stderr)
             return 1
@@ -80,9 +92,20 @@ class Evaluate:
             print(json.dumps(document, indent=1, allow_nan=False))
             return 0
         print_tables(tables)
-        for name in (ROWS, SUMMARY, TABLES):
-            print(folder.folder / name)
+        for path in [*(folder.folder / name for name in (ROWS, SUMMARY, TABLES)), *pages]:
+            print(path)
         return 0
+
+    def _report(self, plan: Plan, folder: Path, target: Path) -> Path:
+        """Write the report, without replays where what writes them is not installed."""
+        writer: Writer | None = None
+        if not self.no_replays:
+            try:
+                load_viser()
+                writer = write_replay
+            except DependencyNotInstalled as error:
+                print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
+        return write_report(folder, into=target, plan=plan, replay=writer)
 
     def _baseline(self, labels: list[str]) -> str:
         """Return the baseline; ValueError for one that does not fly."""

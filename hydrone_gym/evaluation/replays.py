@@ -1,0 +1,140 @@
+"""The flights that show a policy, its best, its median and its worst one: which they are, and flying them again."""
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from hydrone_gym.evaluation.flight import Flight, fly
+from hydrone_gym.evaluation.jobs import make_env
+from hydrone_gym.evaluation.plan import Plan
+from hydrone_gym.evaluation.policies import PolicySource
+from hydrone_gym.evaluation.records import COLUMNS, TIMING, Record, record_of
+from hydrone_gym.evaluation.suites import load_suite
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.simulation import Simulation
+
+REPLAYS = "replays"  # folder beside the page
+# from the least bad end to the worst
+_ENDS = (
+    Outcome.GOAL,
+    Outcome.TIMEOUT,
+    Outcome.OUT_OF_BOUNDS,
+    Outcome.DIVERGED,
+    Outcome.ROUGH_TRANSITION,
+    Outcome.COLLISION,
+)
+_RANK = {outcome.name: rank for rank, outcome in enumerate(_ENDS)}
+
+
+class Writer(Protocol):
+    """Writes the replay of a flight, as `rendering.replay.write_replay` does."""
+
+    def __call__(self, flight: Flight, simulation: Simulation, path: Path, /, *, title: str) -> object:
+        """Write a page with this title to a path in an existing folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """The flights that show a policy.
+
+    Attributes:
+        policy: its name.
+        best: arrived soonest.
+        median: in the middle, by time, of those that arrived.
+        worst: the soonest collision; without collisions the soonest rough crossing, and so on down to timeouts; the
+            slowest flight where all arrived.
+    """
+
+    policy: str
+    best: Record
+    median: Record
+    worst: Record
+
+
+def shown_flights(records: Sequence[Record]) -> list[Shown]:
+    """Choose the flights that show each policy, in the order of the policies; where none arrived, among them all."""
+    shown = []
+    for policy in dict.fromkeys(record.policy for record in records):
+        flown = sorted((record for record in records if record.policy == policy), key=_badness)
+        arrived = [record for record in flown if record.success] or flown
+        median = arrived[(len(arrived) - 1) // 2]
+        shown.append(Shown(policy=policy, best=flown[0], median=median, worst=flown[-1]))
+    return shown
+
+
+def _badness(record: Record) -> tuple[int, float]:
+    return _RANK[record.outcome], record.time if record.success else -record.time
+
+
+def plan_of(arguments: Mapping[str, Any]) -> Plan:
+    """Find again what an evaluation flew, from the arguments in its summary.
+
+    Raises:
+        ValueError: a suite that is not what it was; FileNotFoundError: one that is not frozen and has no file here.
+    """
+    suites = []
+    for name, fingerprint in arguments["suites"].items():
+        suite = load_suite(name).first(max(arguments["worlds"][name].values()))
+        if suite.fingerprint() != fingerprint:
+            raise ValueError(f"suite {name}: its worlds are not those that were flown; give the plan of the evaluation")
+        suites.append(suite)
+    policies = []
+    for label, origin in arguments["policies"].items():
+        factory, _, folder = origin.partition(" ")
+        policies.append(PolicySource(label=label, factory=factory, search=os.getcwd(), folder=folder))
+    return Plan(suites=tuple(suites), policies=tuple(policies), seed=arguments["seed"], vehicle=arguments["vehicle"])
+
+
+def write_replays(shown: Sequence[Shown], plan: Plan, folder: Path, write: Writer) -> dict[Record, tuple[Path, Record]]:
+    """Fly the flights again and write a replay of each into a folder, which is made if missing.
+
+    Args:
+        shown: what to fly.
+        plan: where its worlds and policies are found.
+        folder: to write to.
+        write: writes one.
+
+    Returns:
+        For each record the file, and the record of the flight in it: another one for a policy that draws at random or
+        stops by the clock, or whose code has changed since.
+
+    Raises:
+        ValueError: a world or a policy that the plan does not have, or a policy that cannot be made any more.
+        OSError: a file that cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written: dict[Record, tuple[Path, Record]] = {}
+    for number, entry in enumerate(shown, start=1):
+        for name, record in (("best", entry.best), ("median", entry.median), ("worst", entry.worst)):
+            if record in written:
+                continue
+            flight, simulation = fly_again(record, plan)
+            path = folder / f"{number}-{re.sub('[^a-zA-Z0-9.-]+', '_', entry.policy)[-60:]}-{name}.html"
+            write(flight, simulation, path, title=f"{entry.policy}, {name} flight: {place_of(record)}")
+            written[record] = (path, record_of(record.key, flight))
+    return written
+
+
+def fly_again(record: Record, plan: Plan) -> tuple[Flight, Simulation]:
+    """Fly what a record tells of; errors as for `write_replays`."""
+    missions = {(suite.name, m.name): m for suite in plan.suites for m in suite.missions}
+    mission = missions.get((record.suite, record.mission))
+    sources = [policy for policy in plan.policies if policy.label == record.policy]
+    if mission is None or record.world >= len(mission.scenarios) or not sources:
+        raise ValueError(f"the plan does not hold {place_of(record)}, policy {record.policy}")
+    env = make_env(mission.env_id, {**mission.options, "vehicle": plan.vehicle})
+    flight = fly(env, sources[0].make(env, plan.seed), scenario=mission.scenarios[record.world])
+    return flight, env.get_wrapper_attr("simulation")
+
+
+def place_of(record: Record) -> str:
+    """Name the world of a record."""
+    return f"{record.suite}, {record.mission}, world {record.world}"
+
+
+def same_flight(one: Record, other: Record) -> bool:
+    """Tell whether two records differ in nothing but times of decisions."""
+    return all(getattr(one, name) == getattr(other, name) for name in COLUMNS if name not in TIMING)

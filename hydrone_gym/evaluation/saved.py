@@ -1,0 +1,141 @@
+"""Flights that were saved as numbers, read back and flown again from their references."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym.evaluation.flight import Flight, Trace
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
+from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.scenario import Scenario
+
+FORMAT = "hydrone_gym flights"
+VERSION = 1
+_SAME = 1e-6  # m, rad, m/s: another processor may round otherwise, another model flies elsewhere
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SavedFlight:
+    """A flight in a file of `hydrone fly`.
+
+    Attributes:
+        name: what the file calls it.
+        policy, seed, vehicle: options it was flown with.
+        scenario: what was flown.
+        references: (K, 4) a period: m, m, m, rad.
+        states: (K + 1, 12) at the start and after each period.
+        detected: (k, 4) spheres in order of detection, m.
+        record: everything the file says of it, see `flight_record`.
+    """
+
+    name: str
+    policy: str
+    seed: int
+    vehicle: str
+    scenario: Scenario
+    references: NDArray[np.float64]
+    states: NDArray[np.float64]
+    detected: NDArray[np.float64]
+    record: dict[str, Any]
+
+
+def read_flights(path: str | Path) -> list[SavedFlight]:
+    """Read the flights that `hydrone fly` saved in its flight.json.
+
+    Raises:
+        ValueError: another kind of file or a damaged one, naming the file and what is wrong.
+        OSError: a file that cannot be read.
+    """
+    content = Path(path).read_bytes()
+    try:
+        document = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: not complete JSON: {error}") from None
+    found = (document.get("format"), document.get("version")) if isinstance(document, dict) else (None, None)
+    if found != (FORMAT, VERSION):
+        raise ValueError(f'{path}: must be a file "{FORMAT}" of version {VERSION}, got {found[0]!r}, {found[1]!r}')
+    try:
+        flights = [_flight(record, document) for record in document["flights"]]
+    except KeyError as error:
+        raise ValueError(f"{path}: damaged: lacks {error}") from None
+    except (ValueError, TypeError, AttributeError) as error:
+        raise ValueError(f"{path}: damaged: {error}") from None
+    if not flights:
+        raise ValueError(f"{path}: holds no flight")
+    return flights
+
+
+def _flight(record: dict[str, Any], document: dict[str, Any]) -> SavedFlight:
+    """Turn one record into a flight; any error says what is wrong with it."""
+    references = _table("references", record["references"], 4)
+    states = _table("states", record["states"], 12)
+    if not len(references) or len(states) != len(references) + 1:
+        raise ValueError(f"there must be one state more than references, got {len(states)} and {len(references)}")
+    if record["outcome"] not in Outcome.__members__:
+        raise ValueError(f"unknown outcome {record['outcome']!r}")
+    named_vehicle(document["vehicle"])
+    return SavedFlight(
+        name=str(record["name"]),
+        policy=str(document["policy"]),
+        seed=int(document["seed"]),
+        vehicle=document["vehicle"],
+        scenario=Scenario(**record["scenario"]),
+        references=references,
+        states=states,
+        detected=_table("detected", record["detected"], 4),
+        record={**record, **{name: float(record[name]) for name in ("time", "energy", "length", "episode_return")}},
+    )
+
+
+def _table(name: str, rows: Any, width: int) -> NDArray[np.float64]:
+    """Return rows of finite numbers; ValueError for anything else."""
+    table = np.array(rows, dtype=np.float64).reshape((-1, width) if not rows else np.shape(rows))
+    if table.ndim != 2 or table.shape[1] != width or not np.isfinite(table).all():
+        raise ValueError(f"{name} must be rows of {width} finite numbers, got shape {table.shape}")
+    return table
+
+
+def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
+    """Fly the references of a saved flight again, tick by tick: the same kernel, so the same flight bit for bit.
+
+    Args:
+        saved: from `read_flights`.
+        simulation: of an environment with its vehicle and otherwise the defaults, which `hydrone fly` uses.
+
+    Returns:
+        The flight; times of decisions and interventions of a shield are not saved and stay empty.
+
+    Raises:
+        ValueError: the references lead elsewhere, as with another version of the model.
+    """
+    goal, obstacles = np.array(saved.scenario.goal), saved.scenario.obstacles
+    times, states, moving, _ = trajectory(simulation, row_at(saved.states[0], goal), saved.references, obstacles)
+    last, ends = len(times) - 1, simulation.ticks * np.arange(len(saved.states))
+    apart = float(np.abs(states[np.minimum(ends, last)] - saved.states).max())
+    if not ends[-2] < last <= ends[-1] or apart > _SAME:
+        raise ValueError(
+            f"{saved.name}: its references no longer lead where they led, {apart:.2g} (m, rad, m/s) apart: "
+            "it was flown with another version or was changed"
+        )
+    record, clearance = saved.record, saved.record["clearance"]
+    return Flight(
+        scenario=saved.scenario,
+        outcome=Outcome[record["outcome"]],
+        time=record["time"],
+        energy=record["energy"],
+        clearance=np.inf if clearance is None else float(clearance),
+        transitions=record["transitions"],
+        length=record["length"],
+        episode_return=record["episode_return"],
+        references=saved.references,
+        states=saved.states,
+        detected=saved.detected,
+        decision_ms=np.zeros(0),
+        interventions=None,
+        trace=Trace(times, states, moving),
+    )

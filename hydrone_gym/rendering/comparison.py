@@ -1,0 +1,259 @@
+"""Figures that compare policies: success, distributions, success against density, times of decisions.
+
+Every figure is one small panel, wide enough for a phone, and has all policies as rows in the same order and colours;
+a policy without values keeps its row. Functions take plain arrays and return Matplotlib figures; `to_svg` writes them.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hydrone_gym.rendering import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's eight; yellow last, for it is faint on white
+COLOURS = (
+    style.BLUE,
+    "#E69F00",
+    style.GREEN,
+    style.PURPLE,
+    style.WATER,
+    style.RED,
+    style.BLACK,
+    "#F0E442",
+)
+_MARKERS = "osD^vP*X"
+_WIDTH = 5.2  # inches of a panel
+_ROW = 0.37  # inches a policy takes
+_EDGE = "#333333"
+_RIM: dict[str, Any] = {"markeredgecolor": _EDGE, "markeredgewidth": 0.5}
+_MUTED = "#5a6570"
+_LABEL, _TITLE = 22, 44  # characters that fit
+_WHISKERS = (5, 95)  # percentiles
+
+Rates = Mapping[str, tuple[float, float | None, float | None] | None]
+
+
+def colour(index: int) -> str:
+    """Return the colour of the policy with this number, from 0; they begin again after eight."""
+    return COLOURS[index % len(COLOURS)]
+
+
+def plot_success(rates: Rates, *, title: str = "") -> Figure:
+    """Draw success rates as bars with their intervals.
+
+    Args:
+        rates: for each policy the share that arrived and both ends of its interval, from 0 to 1; None where
+            it did not fly.
+        title: shown above.
+    """
+    with _panel(rates, title) as (figure, axes):
+        for row, entry in enumerate(rates.values()):
+            if entry is None:
+                continue
+            value, low, high = entry
+            axes.barh(row, 100.0 * value, 0.62, color=colour(row), edgecolor=_EDGE, linewidth=0.7)
+            if low is not None and high is not None:
+                _interval(axes, row, 100.0 * low, 100.0 * high)
+            _note(axes, row, f"{100.0 * value:.1f} %")
+        axes.set_xlim(0.0, 100.0)
+        axes.set_xlabel("flights that arrived (%)")
+    return figure
+
+
+def plot_distributions(
+    values: Mapping[str, ArrayLike],
+    label: str,
+    *,
+    title: str = "",
+    limit: float | None = None,
+    limit_label: str = "",
+) -> Figure:
+    """Draw a box a policy: quartiles and median, whiskers from the 5th to the 95th percentile, single values beyond.
+
+    Args:
+        values: for each policy its values, any number of them.
+        label: of the axis, with unit.
+        title: shown above.
+        limit: value marked by a dashed line.
+        limit_label: what the line is.
+    """
+    with _panel(values, title) as (figure, axes):
+        axes.use_sticky_edges = False  # else boxes would end at the frame
+        for row, entry in enumerate(values.values()):
+            numbers = np.asarray(entry, dtype=np.float64)
+            if numbers.size:
+                _box(axes, row, numbers)
+            _note(axes, row, f"n = {numbers.size}")
+        if limit is not None:
+            _limit(axes, limit, limit_label)
+        axes.set_xlabel(label)
+    return figure
+
+
+def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title: str = "") -> Figure:
+    """Draw success against the number of obstacles.
+
+    Args:
+        counts: (K,) numbers of obstacles, ascending.
+        rates: for each policy (K, 3), share that arrived and both ends of its interval, from 0 to 1; NaN where it did
+            not fly.
+        title: shown above.
+
+    Raises:
+        ValueError: rates of another shape.
+    """
+    gap = float(np.diff(counts).min()) if len(counts) > 1 else 1.0
+    step = 0.6 * gap / max(len(rates), 1)  # side by side, so that no interval hides another
+    with _drawing(4.9, title) as (figure, axes):
+        for index, (policy, entry) in enumerate(rates.items()):
+            shares = 100.0 * np.asarray(entry, dtype=np.float64)
+            if shares.shape != (len(counts), 3):
+                raise ValueError(f"rates of {policy} must have shape ({len(counts)}, 3), got {shares.shape}")
+            places = np.asarray(counts) + step * (index - 0.5 * (len(rates) - 1))
+            axes.errorbar(
+                places,
+                shares[:, 0],
+                yerr=np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None),
+                color=colour(index),
+                marker=_MARKERS[index % len(_MARKERS)],
+                markersize=6.5,
+                linewidth=1.6,
+                linestyle="-" if index < len(COLOURS) else "--",
+                elinewidth=1.2,
+                label=shortened(policy, _LABEL),
+                **_RIM,
+            )
+        axes.set_xticks(counts)
+        axes.set_ylim(top=102.0)
+        axes.set_xlabel("number of obstacles")
+        axes.set_ylabel("flights that arrived (%)")
+        axes.grid(color="#e6e6e6", linewidth=0.6)
+        figure.legend(loc="outside lower center", ncols=2, frameon=False, handlelength=1.6, columnspacing=1.2)
+    return figure
+
+
+def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "") -> Figure:
+    """Draw times of decisions, p50 and p99 joined by a line, on a logarithmic axis.
+
+    Args:
+        times: for each policy p50 and p99, ms, positive.
+        title: shown above.
+    """
+    from matplotlib.ticker import FormatStrFormatter, NullFormatter
+
+    with _panel(times, title) as (figure, axes):
+        axes.set_xscale("log")
+        for row, (p50, p99) in enumerate(times.values()):
+            axes.plot([p50, p99], [row, row], color=colour(row), linewidth=3.0, solid_capstyle="round")
+            look: dict[str, Any] = {
+                "markeredgecolor": _EDGE,
+                "markeredgewidth": 0.7,
+                "markersize": 8,
+                "linestyle": "none",
+            }
+            for value, marker in ((p50, "o"), (p99, "D")):
+                axes.plot([value], [row], marker=marker, color=colour(row), **look)
+            _note(axes, row, f"{p50:.2g} / {p99:.2g}")
+        axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel("time of a decision (ms), ○ p50, ◇ p99")
+    return figure
+
+
+def to_svg(figure: Figure, salt: str) -> str:
+    """Return a figure as SVG whose text stays text; equal figures of equal `salt` give equal bytes."""
+    stream = io.StringIO()
+    with _rules(salt):
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    return stream.getvalue()
+
+
+def shortened(text: str, length: int) -> str:
+    """Return a text of at most so many characters, its middle left out if it is longer."""
+    if len(text) <= length:
+        return text
+    kept = length - 1
+    return f"{text[: kept // 2]}…{text[len(text) - kept + kept // 2 :]}"
+
+
+@contextmanager
+def _rules(salt: str = "") -> Iterator[None]:
+    """Apply the style; a dollar in the name of a policy is a dollar, and text in SVG stays text."""
+    from matplotlib import rc_context
+
+    own = {"text.parse_math": False, "svg.fonttype": "none", "svg.hashsalt": f"hydrone-{salt}"}
+    with rc_context({**style.FONTS, **own}):
+        yield
+
+
+@contextmanager
+def _drawing(height: float, title: str) -> Iterator[tuple[Figure, Axes]]:
+    """Yield a new figure and its axes, to be filled in the style."""
+    from matplotlib.figure import Figure
+
+    with _rules():
+        figure = Figure(figsize=(_WIDTH, height), dpi=style.DOTS_PER_INCH, layout="constrained")
+        axes = figure.subplots()
+        axes.set_axisbelow(True)
+        figure.suptitle(shortened(title, _TITLE), x=0.01, ha="left", fontsize=13)
+        yield figure, axes
+
+
+@contextmanager
+def _panel(policies: Mapping[str, Any], title: str) -> Iterator[tuple[Figure, Axes]]:
+    """Yield a figure and axes with one row a policy, the first on top."""
+    rows = max(len(policies), 2)
+    with _drawing(1.25 + _ROW * rows, title) as (figure, axes):
+        axes.grid(axis="x", color="#e6e6e6", linewidth=0.6)
+        axes.set_yticks(range(len(policies)), [shortened(policy, _LABEL) for policy in policies])
+        axes.tick_params(axis="y", length=0)
+        axes.set_ylim(len(policies) - 0.4, -0.6)
+        yield figure, axes
+
+
+def _note(axes: Axes, row: int, text: str) -> None:
+    """Write a short text right of a row."""
+    place = axes.get_yaxis_transform()
+    axes.text(1.03, row, text, transform=place, va="center", ha="left", fontsize=10, color=_MUTED)
+
+
+def _interval(axes: Axes, row: int, low: float, high: float) -> None:
+    """Draw the interval of a bar, white beneath dark so that it shows on dark bars too."""
+    for shade, width in (("white", 3.6), (_EDGE, 1.6)):
+        axes.plot([low, high], [row, row], color=shade, linewidth=width, solid_capstyle="butt", clip_on=False)
+    for end in (low, high):
+        axes.plot([end, end], [row - 0.16, row + 0.16], color=_EDGE, linewidth=1.6, clip_on=False)
+
+
+def _limit(axes: Axes, limit: float, label: str) -> None:
+    """Mark a value by a line, with words above the first row, on the side where there is more room."""
+    axes.axvline(limit, color=style.RED, linewidth=1.6, linestyle="--")
+    left = limit > sum(axes.get_xlim()) / 2.0
+    look: dict[str, Any] = {"color": style.RED, "fontsize": 10, "ha": "right" if left else "left", "va": "top"}
+    place = (-4 if left else 4, -1)  # points
+    axes.annotate(label, (limit, 1.0), place, ("data", "axes fraction"), "offset points", **look)
+    axes.set_ylim(bottom=axes.get_ylim()[0], top=-1.1)
+
+
+def _box(axes: Axes, row: int, numbers: NDArray[np.float64]) -> None:
+    """Draw one box with its whiskers and the values beyond them."""
+    low, first, median, third, high = np.percentile(numbers, (_WHISKERS[0], 25, 50, 75, _WHISKERS[1]))
+    for inner, outer in ((first, low), (third, high)):
+        axes.plot([inner, outer], [row, row], color=_EDGE, linewidth=1.1)
+        axes.plot([outer, outer], [row - 0.15, row + 0.15], color=_EDGE, linewidth=1.1)
+    axes.barh(row, third - first, 0.6, left=first, color=colour(row), edgecolor=_EDGE, linewidth=0.9)
+    # on black a median is white, with black around it where the box has no width
+    for shade, width in (("black", 4.0), ("white", 1.8)) if colour(row) == style.BLACK else (("black", 2.0),):
+        axes.plot([median, median], [row - 0.3, row + 0.3], color=shade, linewidth=width, solid_capstyle="butt")
+    beyond = numbers[(numbers < low) | (numbers > high)]
+    axes.plot(beyond, np.full(beyond.size, row), "o", color=colour(row), markersize=3.4, alpha=0.8, **_RIM)
