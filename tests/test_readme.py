@@ -38,12 +38,18 @@ def test_links_lead_somewhere():
 
 def test_the_commands_are_those_of_the_package(monkeypatch, tmp_path, capsys):
     setup, tests = blocks("bash")
-    assert setup.strip().endswith(".venv/bin/hydrone fly")
+    assert setup.strip().endswith(".venv/bin/hydrone evaluate --report comparison")
     assert tests.strip().endswith(".venv/bin/pytest")
     picture = re.search(r"`hydrone (fly [^`]*--seed \d+)`", README)
     assert picture is not None
     assert cli.main([*shlex.split(picture[1]), "--no-figures", "--out", str(tmp_path)]) == 0
-    for option in re.findall(r"`(--[a-z-]+)", README.split("lists the")[1].split("exit code")[0]):
-        with pytest.raises(SystemExit):
-            cli.main(["fly", "--help"])
-        assert option in capsys.readouterr().out
+    (listed,) = re.findall(r"^\| `hydrone fly` \|.*$", README, re.MULTILINE)
+    with pytest.raises(SystemExit):
+        cli.main(["fly", "--help"])
+    shown = capsys.readouterr().out
+    for option in re.findall(r"`(--[a-z-]+)", listed):
+        assert option in shown
+    for command in re.findall(r"^\| `hydrone ([a-z]+)` \|", README, re.MULTILINE):
+        with pytest.raises(SystemExit) as stopped:
+            cli.main([command, "--help"])
+        assert stopped.value.code == 0
