@@ -11,7 +11,7 @@ class _Tanh(torch.autograd.Function):
     @staticmethod
     def forward(context: Any, x: torch.Tensor) -> torch.Tensor:
         """Return tanh of every entry."""
-        y = torch.sigmoid(2.0 * x).mul_(2.0).sub_(1.0)
+        y = (2.0 * x).sigmoid_().mul_(2.0).sub_(1.0)
         context.save_for_backward(y)
         return y
 

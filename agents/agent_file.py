@@ -51,7 +51,7 @@ def observation_fingerprint() -> str:
 
 def save_agent(agent: AgentFile, folder: Path) -> None:
     """Write an agent to a folder, made if missing; raises OSError when that fails."""
-    import yaml  # comes with the extra `agents`
+    import yaml
 
     folder.mkdir(parents=True, exist_ok=True)
     network = agent.network

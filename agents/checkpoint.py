@@ -15,14 +15,18 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-KEPT = 2  # latest checkpoints of a run
+from agents.replay import load_replay, save_replay
+
+KEPT = 2  # latest checkpoints of a run; one if they hold a replay buffer, which is large
 MODEL = "model.zip"
 _REST = "rest.pkl"
+_REPLAY = "replay.npz"
 
 
 def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -> Path:
-    """Write a checkpoint into a folder of them and delete all but the latest `KEPT`; return its path."""
+    """Write a checkpoint into a folder of them, replay buffer included, and delete old ones; return its path."""
     final = folder / f"step_{model.num_timesteps:010d}"
     if final.exists():
         return final
@@ -30,8 +34,11 @@ def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.mkdir(parents=True)
     model.save(unfinished / MODEL)
+    if isinstance(model, OffPolicyAlgorithm):
+        save_replay(model.replay_buffer, unfinished / _REPLAY)
     rest = {
         "environment": model.env,
+        "actions": model.action_space.np_random.bit_generator.state,
         "torch": torch.get_rng_state(),
         "numpy": np.random.get_state(),  # noqa: NPY002  (the stream that Stable-Baselines3 draws from)
         "python": random.getstate(),
@@ -40,7 +47,8 @@ def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -
     with (unfinished / _REST).open("wb") as stream:
         pickle.dump(rest, stream)
     os.replace(unfinished, final)
-    for old in checkpoints(folder)[:-KEPT]:
+    kept = 1 if (final / _REPLAY).exists() else KEPT
+    for old in checkpoints(folder)[:-kept]:
         shutil.rmtree(old)
     return final
 
@@ -54,8 +62,13 @@ def load_checkpoint(path: Path, algorithm: type[BaseAlgorithm]) -> tuple[BaseAlg
     """Return the model, its environment in mid-flight, and what else was saved; sets the global random streams."""
     with (path / _REST).open("rb") as stream:
         rest = pickle.load(stream)
-    # force_reset would throw away the episodes under way
-    model = algorithm.load(path / MODEL, env=rest["environment"], device="cpu", force_reset=False)
+    # force_reset would throw away the episodes under way; a class noted for the replay buffer would be taken for one
+    # of the user, which SB3 warns about
+    changes = {"replay_buffer_class": None} if issubclass(algorithm, OffPolicyAlgorithm) else {}
+    model = algorithm.load(path / MODEL, env=rest["environment"], device="cpu", force_reset=False, **changes)
+    if isinstance(model, OffPolicyAlgorithm):
+        load_replay(model.replay_buffer, path / _REPLAY)
+    model.action_space.np_random.bit_generator.state = rest["actions"]
     torch.set_rng_state(rest["torch"])
     np.random.set_state(rest["numpy"])  # noqa: NPY002
     random.setstate(rest["python"])

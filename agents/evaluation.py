@@ -1,17 +1,27 @@
-"""How often a policy arrives: many held-out worlds flown at once."""
+"""How often a policy arrives: many held-out worlds flown at once.
 
+``python -m agents.evaluation --agent ppo`` prints the table of a shipped agent, or of one of yours by its folder.
+"""
+
+import dataclasses
+import json
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 import hydrone_gym  # noqa: F401  (registers the ids)
+from agents.agent import load_agent
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
+from planners.shield import Shield
 
 MISSIONS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
 HELD_OUT = 10_000_000  # seeds from here on are for evaluation; training uses those below
@@ -56,7 +66,12 @@ def evaluate(
         episodes: number of worlds; world i is the one a single environment draws from ``seed + i``.
         seed: of the first world.
         options: keyword options of the environment.
+
+    Raises:
+        ValueError: no episodes, or an option that the environment refuses.
     """
+    if episodes < 1:
+        raise ValueError(f"episodes must be at least 1, got {episodes}")
     rows = gym.make_vec(mission, num_envs=episodes, vectorization_mode="vector_entry_point", **(options or {}))
     observation, _ = rows.reset(seed=seed)
     running, memory, starts = np.arange(episodes), None, np.ones(episodes, bool)
@@ -86,6 +101,26 @@ def evaluate(
     )
 
 
+def evaluate_missions(
+    agent: str | os.PathLike[str],
+    *,
+    shield: bool,
+    episodes: int = 1000,
+    options: Mapping[str, Any] | None = None,
+) -> list[Score]:
+    """Fly an agent, behind the shield or alone, in held-out worlds of every mission; arguments as in `evaluate`.
+
+    Raises what `load_agent` and `evaluate` raise.
+    """
+    scores = []
+    for mission in MISSIONS:
+        env = gym.make(mission, **(options or {}))
+        loaded = load_agent(agent, env)
+        policy = Shield.for_env(loaded, env) if shield else loaded
+        scores.append(evaluate(policy, mission, episodes=episodes, options=options))
+    return scores
+
+
 def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
     """Pick rows out of a policy's memory: arrays, tuples with an entry a row, and named tuples of such things."""
     if memory is None:
@@ -109,3 +144,44 @@ def score_table(scores: Sequence[Score]) -> str:
             f"{failures} |"
         )
     return "\n".join(lines)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """Fly an agent once in each of many held-out worlds, deterministically, and print how the flights ended."""
+
+    agent: str
+    """Name of a shipped agent, or a folder."""
+    shield: bool = False
+    """Fly behind the shield."""
+    episodes: int = 4000
+    """Worlds a mission."""
+    obstacles: int = 20
+    """Number of spheres."""
+    radii: tuple[float, float] = (0.5, 1.5)
+    """Least and greatest radius of a sphere, m."""
+    vehicle: Literal["paper", "physical"] = "paper"
+    """Parameter set of the vehicle."""
+    json: bool = False
+    """Print JSON instead of the Markdown table."""
+
+    def text(self) -> str:
+        """Fly and return what is printed; raises as `evaluate_missions` does."""
+        options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
+        scores = evaluate_missions(self.agent, shield=self.shield, episodes=self.episodes, options=options)
+        return json.dumps([dataclasses.asdict(score) for score in scores]) if self.json else score_table(scores)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code, 2 for bad input; `arguments` default to those of the process."""
+    command = tyro.cli(Evaluation, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
+    try:
+        print(command.text())
+    except (ValueError, TypeError, OSError) as error:
+        print(f"evaluation: error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.activation import Tanh
 from agents.agent_file import AgentFile
+from agents.algorithms import algorithm_of
 from agents.network import Network
 
 _ACTIVATIONS: dict[type, str] = {torch.nn.Tanh: "tanh", Tanh: "tanh", torch.nn.ReLU: "relu"}
@@ -18,21 +18,16 @@ def export_agent(model: BaseAlgorithm, name: str, environment: str, notes: dict[
     """Take the mean action's network out of a model trained on the egocentric interface.
 
     Args:
-        model: PPO with "MlpPolicy", or SAC, TD3 or TQC with theirs.
+        model: PPO, SAC, TD3 or TQC with "MlpPolicy".
         name: of the agent.
         environment: id it was trained on.
         notes: further plain data to keep with it.
 
     Raises:
-        ValueError: a policy that is no plain multilayer perceptron.
+        ValueError: another algorithm, or a policy that is no plain multilayer perceptron.
     """
-    policy: Any = model.policy
-    if isinstance(model, PPO):
-        layers, output = [*policy.mlp_extractor.policy_net, policy.action_net], "linear"
-    elif hasattr(policy.actor, "latent_pi"):
-        layers, output = [*policy.actor.latent_pi, policy.actor.mu], "tanh"
-    else:
-        layers, output = [*policy.actor.mu][:-1], "tanh"
+    algorithm = algorithm_of(model)
+    layers = algorithm.mean(model.policy)
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
     between = {_ACTIVATIONS.get(type(layer)) for layer in layers if not isinstance(layer, torch.nn.Linear)}
     if len(between) != 1 or None in between or len(layers) != 2 * len(linear) - 1:
@@ -41,7 +36,7 @@ def export_agent(model: BaseAlgorithm, name: str, environment: str, notes: dict[
         weights=tuple(np.ascontiguousarray(layer.weight.detach().cpu().numpy().T) for layer in linear),
         biases=tuple(layer.bias.detach().cpu().numpy().copy() for layer in linear),
         activation=str(between.pop()),
-        output=output,
+        output=algorithm.output,
     )
-    algorithm = type(model).__name__
-    return AgentFile(name=name, algorithm=algorithm, environment=environment, network=network, notes=notes or {})
+    kind = type(model).__name__
+    return AgentFile(name=name, algorithm=kind, environment=environment, network=network, notes=notes or {})

@@ -16,6 +16,11 @@ def ppo_shield(env: Any) -> Shield:
     return Shield.for_env(load_agent("ppo_shielded", env), env)
 
 
+def sac(env: Any) -> Agent:
+    """Return the agent that SAC trained without the shield, for an environment."""
+    return load_agent("sac", env)
+
+
 def from_folder(folder: str, env: Any) -> Agent:
     """Return the agent that training wrote to a folder."""
     return load_agent(folder, env)

@@ -4,8 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.utils import LinearSchedule
+
+from agents.agent import ACTIONS
 
 FOLDER = Path(__file__).parent / "hyperparameters"
 ENV_ID = "HydroneGym/Mission-v0"
@@ -38,8 +42,12 @@ class Recipe:
         return sum(self.missions.values())
 
     def arguments(self) -> dict[str, Any]:
-        """Return the settings as the algorithm takes them: schedules made of their names."""
-        return {name: _scheduled(value) for name, value in self.settings.items()}
+        """Return the settings as the algorithm takes them: schedules and noise made of their names."""
+        arguments = {name: _scheduled(value) for name, value in self.settings.items()}
+        kind, deviation = arguments.pop("noise_type", None), arguments.pop("noise_std", 0.0)
+        if kind is not None:
+            arguments["action_noise"] = NormalActionNoise(np.zeros(ACTIONS), np.full(ACTIONS, deviation))
+        return arguments
 
 
 def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
@@ -62,6 +70,10 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     if missing:
         raise ValueError(f"{file}: {ENV_ID} lacks {', '.join(missing)}")
     count, steps, policy = settings.pop("n_envs"), settings.pop("n_timesteps"), settings.pop("policy")
+    if not isinstance(settings.get("policy_kwargs", {}), dict):
+        raise ValueError(f"{file}: policy_kwargs must be a mapping, code is not run: {settings['policy_kwargs']!r}")
+    if settings.get("noise_type") not in (None, "normal"):
+        raise ValueError(f"{file}: noise_type must be 'normal', got {settings['noise_type']!r}")
     missions = content.get("missions", {ENV_ID: count})
     if not isinstance(missions, dict) or sum(missions.values()) != count:
         raise ValueError(f"{file}: the rows of missions must sum to n_envs = {count}, got {missions!r}")

@@ -1,4 +1,4 @@
-"""What a training run writes while it runs: a line of its curve an update, checkpoints, the progress bar."""
+"""What a training run writes while it runs: lines of its curve, checkpoints, the progress bar."""
 
 import csv
 import time
@@ -10,12 +10,15 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from agents.checkpoint import save_checkpoint
+from hydrone_gym.rendering.style import BLACK, BLUE, GREEN, PURPLE, RED, WATER
 from hydrone_gym.simulation.outcome import Outcome
 
 FAILURES = ("COLLISION", "OUT_OF_BOUNDS", "ROUGH_TRANSITION", "TIMEOUT", "DIVERGED")
 COLUMNS = ("steps", "wall_s", "cpu_s", "episodes", "success", "return", "periods", *(n.lower() for n in FAILURES))
+_COLOURS = (GREEN, RED, PURPLE, BLUE, WATER, BLACK)  # of success and of each failure
 CURVE = "curve.csv"
 CHECKPOINTS = "checkpoints"
+LINES = 500  # of a curve at most; a rollout that is longer than its share of the training has a line of its own
 
 
 class RunLog(BaseCallback):
@@ -38,6 +41,7 @@ class RunLog(BaseCallback):
         self._total, self._every, self._progress, self._spent = total, every, progress, spent
         self._ended: list[tuple[int, float, int]] = []  # outcome, return, periods since the last line
         self._saved_at = -every
+        self._written_at = 0
 
     def _seconds(self) -> tuple[float, float]:
         wall, cpu = time.perf_counter() - self._began[0], time.process_time() - self._began[1]
@@ -52,6 +56,7 @@ class RunLog(BaseCallback):
             total=self._total, initial=self.num_timesteps, unit="step", unit_scale=True, disable=not self._progress
         )
         self._saved_at = self.num_timesteps if self.num_timesteps else -self._every
+        self._written_at = self.num_timesteps
 
     def _cut_curve(self) -> None:
         """Write the head of the curve, or drop lines later than the checkpoint the training goes on from."""
@@ -64,8 +69,11 @@ class RunLog(BaseCallback):
             csv.writer(stream).writerows([list(COLUMNS), *lines])
 
     def _on_rollout_start(self) -> None:
-        """Between an update and a rollout: the one moment at which nothing is under way but the episodes."""
-        if self.num_timesteps - self._saved_at >= self._every:
+        """Between an update and a rollout: the one moment at which nothing is under way but the episodes.
+
+        A line has just been written too, so no ended episodes are waiting for one.
+        """
+        if self.num_timesteps == self._written_at and self.num_timesteps - self._saved_at >= self._every:
             self.checkpoint()
 
     def checkpoint(self) -> None:
@@ -81,16 +89,22 @@ class RunLog(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
+        self._bar.update(self.num_timesteps - self._bar.n)
+        if self.num_timesteps - self._written_at >= self._total / LINES:
+            self._write_line()
+
+    def _write_line(self) -> None:
         line = _summary(self._ended)
         wall, cpu = self._seconds()
         self._writer.writerow([self.num_timesteps, f"{wall:.2f}", f"{cpu:.2f}", len(self._ended), *line])
         self._file.flush()
-        self._bar.update(self.num_timesteps - self._bar.n)
         if self._ended:
             self._bar.set_postfix_str(f"success {100.0 * float(line[0]):.1f} %")
-        self._ended = []
+        self._ended, self._written_at = [], self.num_timesteps
 
     def _on_training_end(self) -> None:
+        if self.num_timesteps > self._written_at:
+            self._write_line()
         self.checkpoint()
         self._bar.close()
         self._file.close()
@@ -114,8 +128,9 @@ def draw_curve(folder: Path) -> Path:
         lines = [line for line in csv.DictReader(stream) if line["success"]]
     steps = [float(line["steps"]) / 1e6 for line in lines]
     figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
-    for name in ("success", *(failure.lower() for failure in FAILURES)):
-        axes.plot(steps, [100.0 * float(line[name]) for line in lines], label=name.replace("_", " "))
+    for name, colour in zip(("success", *(failure.lower() for failure in FAILURES)), _COLOURS, strict=True):
+        shares = [100.0 * float(line[name]) for line in lines]
+        axes.plot(steps, shares, color=colour, linewidth=1.0, label=name.replace("_", " "))
     axes.set_xlabel("steps (million)")
     axes.set_ylabel("episodes, while exploring (%)")
     axes.set_ylim(0, 100)

@@ -14,8 +14,8 @@ import tyro
 class Train:
     """Train an agent, evaluate it on held-out worlds and write a run folder."""
 
-    algorithm: Annotated[Literal["ppo", "ppo_shielded"], tyro.conf.Positional] = "ppo"
-    """Recipe: ppo, or ppo_shielded, which goes on behind the shield and wants --start-from."""
+    algorithm: Annotated[Literal["ppo", "ppo_shielded", "sac", "td3", "tqc"], tyro.conf.Positional] = "ppo"
+    """Recipe; ppo_shielded goes on behind the shield and wants --start-from."""
     out: Path | None = None
     """Run folder, runs/<algorithm>-<seed> unless given; must not hold a run already."""
     seed: int = 0
@@ -38,6 +38,8 @@ class Train:
     """Least number of steps between checkpoints."""
     evaluation_episodes: int = 1000
     """Held-out worlds a mission to evaluate on, 0 for none."""
+    tensorboard: bool = False
+    """Also write a log for TensorBoard; needs the extra `tensorboard`."""
     json: bool = False
     """Print one JSON document instead of the table, and show no progress bar."""
 
@@ -89,4 +91,5 @@ class Train:
             "threads": self.num_threads,
             "checkpoint_every": self.checkpoint_every,
             "evaluation_episodes": self.evaluation_episodes,
+            "tensorboard": self.tensorboard,
         }

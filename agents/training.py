@@ -9,29 +9,26 @@ import json
 import platform
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import torch
 import yaml
-from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.activation import Tanh
-from agents.agent import load_agent
 from agents.agent_file import save_agent
+from agents.algorithms import ALGORITHMS, Algorithm
 from agents.checkpoint import MODEL, checkpoints, load_checkpoint
-from agents.evaluation import HELD_OUT, MISSIONS, Score, evaluate
+from agents.evaluation import HELD_OUT, Score, evaluate_missions
 from agents.export import export_agent
 from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, Recipe, load_recipe
 from agents.run_log import CHECKPOINTS, RunLog, draw_curve
-from planners.shield import Shield
 
-ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "ppo_shielded": PPO}  # of each recipe
 CONFIG = "config.yaml"
-PACKAGES = ("hydrone-gym", "stable_baselines3", "torch", "gymnasium", "numpy", "numba")
+TENSORBOARD = "tensorboard"
+PACKAGES = ("hydrone-gym", "stable_baselines3", "sb3_contrib", "torch", "gymnasium", "numpy", "numba")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,9 +47,10 @@ class TrainingRun:
         checkpoint_every: least number of steps between checkpoints.
         evaluation_episodes: held-out worlds a mission at the end, 0 for none.
         progress: show a bar on stderr.
+        tensorboard: also write Stable-Baselines3's own log for TensorBoard.
 
     Raises:
-        ValueError: an option out of range.
+        ValueError: an option out of range, or TensorBoard asked for and not installed.
     """
 
     folder: Path
@@ -66,6 +64,7 @@ class TrainingRun:
     checkpoint_every: int = 500_000
     evaluation_episodes: int = 1000
     progress: bool = True
+    tensorboard: bool = False
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -76,6 +75,8 @@ class TrainingRun:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
         if self.steps is not None and self.steps < 1:
             raise ValueError(f"steps must be at least 1, got {self.steps}")
+        if self.tensorboard and find_spec("tensorboard") is None:
+            raise ValueError('tensorboard is not installed: pip install "hydrone-gym[tensorboard]"')
 
     def loaded_recipe(self) -> Recipe:
         """Return the recipe with this run's number of steps."""
@@ -95,7 +96,8 @@ def train(run: TrainingRun) -> list[Score]:
         raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
     torch.set_num_threads(run.threads)
     rows = MissionMix(recipe.missions, run.options, shield=recipe.shield)
-    model = ALGORITHMS[run.algorithm](recipe.policy, rows, **_arguments(recipe), seed=run.seed, device="cpu")
+    algorithm = ALGORITHMS[run.algorithm]
+    model = algorithm.model(recipe.policy, rows, **_arguments(recipe, algorithm), seed=run.seed, device="cpu")
     if run.start_from is not None:
         model.set_parameters(_latest(run.start_from) / MODEL, device="cpu")
     run.folder.mkdir(parents=True, exist_ok=True)
@@ -116,14 +118,14 @@ def resume(folder: Path, *, progress: bool = True) -> list[Score]:
     paths = {name: content["run"][name] and Path(content["run"][name]) for name in ("recipe", "start_from")}
     run = TrainingRun(**{**content["run"], **paths, "folder": folder, "progress": progress})
     torch.set_num_threads(run.threads)
-    model, extra = load_checkpoint(_latest(folder), ALGORITHMS[run.algorithm])
+    model, extra = load_checkpoint(_latest(folder), ALGORITHMS[run.algorithm].model)
     return _learn(run, recipe, model, extra["spent"])
 
 
-def _arguments(recipe: Recipe) -> dict[str, Any]:
-    """Complete the recipe's settings: the fast tanh where it says nothing else, and a longer memory of successes."""
+def _arguments(recipe: Recipe, algorithm: Algorithm) -> dict[str, Any]:
+    """Complete the recipe's settings: the activation where it says nothing else, and a longer memory of successes."""
     arguments = recipe.arguments()
-    policy = {"activation_fn": Tanh, **arguments.get("policy_kwargs", {})}
+    policy = {"activation_fn": algorithm.activation, **arguments.get("policy_kwargs", {})}
     return {"stats_window_size": 1000, **arguments, "policy_kwargs": policy}
 
 
@@ -137,28 +139,20 @@ def _latest(folder: Path) -> Path:
 def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[float, float]) -> list[Score]:
     """Train to the end, then write the curve's figure, the agent and its evaluation."""
     log = RunLog(run.folder, recipe.steps, every=run.checkpoint_every, progress=run.progress, spent=spent)
+    model.tensorboard_log = str(run.folder / TENSORBOARD) if run.tensorboard else None
     left = recipe.steps - model.num_timesteps
     if left > 0:
-        model.learn(left, callback=log, reset_num_timesteps=model.num_timesteps == 0)
+        interval = ALGORITHMS[run.algorithm].log_interval
+        model.learn(left, callback=log, log_interval=interval, reset_num_timesteps=model.num_timesteps == 0)
     draw_curve(run.folder)
+    folder, episodes = run.folder / "agent", run.evaluation_episodes
     notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions()}
-    save_agent(export_agent(model, run.folder.name, ENV_ID, notes), run.folder / "agent")
-    scores = evaluate_missions(run, shield=recipe.shield)
+    save_agent(export_agent(model, run.folder.name, ENV_ID, notes), folder)
+    scores = []
+    if episodes > 0:
+        scores = evaluate_missions(folder, shield=recipe.shield, episodes=episodes, options=run.options)
     text = json.dumps([dataclasses.asdict(score) for score in scores], indent=1)
     (run.folder / "evaluation.json").write_text(text + "\n", encoding="utf-8")
-    return scores
-
-
-def evaluate_missions(run: TrainingRun, *, shield: bool) -> list[Score]:
-    """Fly a run's finished agent, behind the shield if it was trained there, on held-out worlds of every mission."""
-    if run.evaluation_episodes == 0:
-        return []
-    scores = []
-    for mission in MISSIONS:
-        env = gym.make(mission, **run.options)
-        agent = load_agent(run.folder / "agent", env)
-        policy = Shield.for_env(agent, env) if shield else agent
-        scores.append(evaluate(policy, mission, episodes=run.evaluation_episodes, options=run.options))
     return scores
 
 

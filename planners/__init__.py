@@ -1,13 +1,15 @@
 """Planners: policies that look ahead with the environment's own model."""
 
 from planners.cl_rrt.memory import Memory, Report
-from planners.cl_rrt.policy import CLRRT, TreeView
+from planners.cl_rrt.policy import CLRRT
 from planners.cl_rrt.settings import CLRRTSettings
+from planners.cl_rrt.view import TreeView
 from planners.mppi import MPPI
 from planners.open_loop_rrt import OpenLoopRRT
 from planners.policy import Known, PlannerPolicy
 from planners.potential_field import PotentialField
 from planners.published import PublishedCLRRT
+from planners.recording import TreeRecorder
 from planners.straight_line import StraightLine
 
 __all__ = [
@@ -22,5 +24,6 @@ __all__ = [
     "PublishedCLRRT",
     "Report",
     "StraightLine",
+    "TreeRecorder",
     "TreeView",
 ]

@@ -10,15 +10,24 @@ from collections.abc import Sequence
 
 import tyro
 
+from agents.clone_command import Clone, Demonstrate
 from agents.train_command import Train
 from hydrone_gym.cli.evaluate import Evaluate
 from hydrone_gym.cli.fly import Fly
+from hydrone_gym.cli.replay import Replay
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `arguments` default to those of the process."""
     command = tyro.extras.subcommand_cli_from_dict(
-        {"fly": Fly, "evaluate": Evaluate, "train": Train},
+        {
+            "fly": Fly,
+            "evaluate": Evaluate,
+            "replay": Replay,
+            "train": Train,
+            "demonstrate": Demonstrate,
+            "clone": Clone,
+        },
         prog="hydrone",
         description="Fly the HyDrone in air, through the water surface and below it.",
         args=arguments,

@@ -8,54 +8,23 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
-from hydrone_gym.cli.compiling import announce_compiling, kernels_of
+from hydrone_gym.cli.missions import Mission, MissionOptions
 from hydrone_gym.evaluation.flight import Flight, fly
-from hydrone_gym.evaluation.policies import find_policy
-from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.report import draw_flight, flight_record
-from hydrone_gym.world.scenario import Scenario, load_scenario
+from hydrone_gym.evaluation.saved import FORMAT, VERSION
 from planners import CLRRT
 
-EXPERIMENTS = {1: "HydroneGym/AirToWater-v0", 2: "HydroneGym/WaterToAir-v0"}
 _TREE_ITERATIONS = 400  # samples of the tree figure
 
 
-@dataclass(frozen=True)
-class Mission:
-    """One thing to fly: where, with what, and what the files and the column of the table are called."""
-
-    name: str
-    env: gym.Env
-    policy: Policy
-    scenario: Scenario
-    observation: dict[str, np.ndarray]  # the first
-
-
 @dataclass(frozen=True, kw_only=True)
-class Fly:
+class Fly(MissionOptions):
     """Fly the paper's experiments, print what happened and draw the figures."""
 
-    experiment: Literal[1, 2] | None = None
-    """1: air to water, 2: water to air; both unless given."""
-    seed: int = 0
-    """Seed of the random world and of the planner."""
-    obstacles: int | None = None
-    """Number of spheres, 20 unless given."""
-    policy: str = "clrrt"
-    """Registered name such as clrrt or straight-line; module:attribute, file.py:attribute, or an agent's folder."""
-    iterations: int | None = None
-    """Samples the CL-RRT draws each cycle, the planner's own number unless given."""
-    time_budget: float | None = None
-    """Seconds a CL-RRT cycle may take, instead of a number of samples; not reproducible."""
-    scenario: Path | None = None
-    """Fly this scenario file instead of an experiment."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
     out: Path = Path("flights")
     """Folder for figures and flight.json; made if missing."""
     json: bool = False
@@ -66,7 +35,7 @@ class Fly:
     def run(self) -> int:
         """Fly, report and return the exit code."""
         try:
-            missions = self._missions()
+            missions = self.missions()
             self.out.mkdir(parents=True, exist_ok=True)
         except (ValueError, OSError) as error:
             print(f"hydrone: error: {error}", file=sys.stderr)
@@ -83,39 +52,6 @@ class Fly:
         self._report(records)
         return 0 if all(record["success"] for record in records) else 1
 
-    def _missions(self) -> list[Mission]:
-        """Check the options and set up what they ask for; raises ValueError or OSError."""
-        if self.seed < 0:
-            raise ValueError(f"--seed must not be negative, got {self.seed}")
-        if self.iterations is not None and self.time_budget is not None:
-            raise ValueError("--iterations and --time-budget exclude each other")
-        if self.policy != "clrrt" and (self.iterations is not None or self.time_budget is not None):
-            raise ValueError("--iterations and --time-budget are options of --policy clrrt")
-        source = find_policy(self.policy)
-        if self.scenario is None:
-            announce_compiling(*kernels_of(source))
-            numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
-            count = 20 if self.obstacles is None else self.obstacles
-            return [self._mission(f"experiment-{number}", EXPERIMENTS[number], count, None) for number in numbers]
-        if self.experiment is not None or self.obstacles is not None:
-            raise ValueError("--scenario excludes --experiment and --obstacles")
-        scenario = load_scenario(self.scenario)
-        announce_compiling(*kernels_of(source))
-        return [self._mission(self.scenario.stem, "HydroneGym/Mission-v0", len(scenario.obstacles), scenario)]
-
-    def _mission(self, name: str, env_id: str, obstacles: int, scenario: Scenario | None) -> Mission:
-        """Make environment and policy; without a scenario the seed draws one."""
-        env = gym.make(env_id, num_obstacles=obstacles, vehicle=self.vehicle)
-        observation, _ = env.reset(seed=self.seed, options=None if scenario is None else {"scenario": scenario})
-        return Mission(name, env, self._policy(env), env.get_wrapper_attr("scenario"), observation)
-
-    def _policy(self, env: gym.Env) -> Policy:
-        if self.time_budget is not None:
-            return CLRRT.for_env(env, time_budget=self.time_budget, seed=self.seed)
-        if self.iterations is not None:
-            return CLRRT.for_env(env, iterations=self.iterations, seed=self.seed)
-        return find_policy(self.policy).make(env, self.seed)
-
     def _draw(self, mission: Mission, flight: Flight, step: Callable[[str], None]) -> list[Path]:
         """Write the figures of one mission; return their paths."""
         step(f"{mission.name}: drawing the flight")
@@ -126,7 +62,7 @@ class Fly:
     def _report(self, records: list[dict[str, Any]]) -> None:
         """Write flight.json, and print it or the table."""
         options = {"policy": self.policy, "seed": self.seed, "vehicle": self.vehicle}
-        document = {"format": "hydrone_gym flights", "version": 1, **options, "flights": records}
+        document = {"format": FORMAT, "version": VERSION, **options, "flights": records}
         text = json.dumps(document, indent=1, allow_nan=False)
         saved = self.out / "flight.json"
         saved.write_text(text + "\n", encoding="utf-8")

@@ -29,6 +29,7 @@ DEFAULT_POLICIES = (
     "clrrt",
     "ppo",
     "ppo-shield",
+    "sac",
 )
 Factory = Callable[..., Policy]
 _NAMES, _FOLDERS = "hydrone_gym.policies", "hydrone_gym.policy_folders"

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +15,12 @@ from planners.cl_rrt.objective import objective_params
 from planners.cl_rrt.settings import CLRRTSettings
 from planners.cl_rrt.stopping import safe_speed
 from planners.cl_rrt.tree import Workspace, new_workspace
+from planners.cl_rrt.view import TreeView, tree_view
 from planners.policy import Known, Observation, PlannerPolicy, known, simulation_of
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
 _CAREFUL_AFTER, _ANY_MEDIUM_AFTER = 2, 8  # cycles without a path before samples are sought further afield
-
-
-class TreeView(NamedTuple):
-    """A tree as arrays, for looking at it."""
-
-    edges: NDArray[np.float64]  # (E, 2, 3) reference at the parent and at the node, m
-    air: NDArray[np.bool_]  # (E,) whether the node lies in air
-    time: NDArray[np.float64]  # (E,) s from the root
-    path: NDArray[np.intp]  # edges of the best path to the goal, in order; empty if none
 
 
 class CLRRT(PlannerPolicy):
@@ -201,12 +193,4 @@ class CLRRT(PlannerPolicy):
         whole = CLRRT(self.simulation, iterations=iterations, seed=self.seed, settings=self.settings)
         whole._params = whole._params._replace(prune=0.0)  # a picture of the tree wants its other branches too
         size = whole._run(work, start, start.state[:3], memory, 0.0)[0]
-        nodes = work.nodes[:size]
-        edges = np.stack([nodes["reference"][nodes["parent"][1:], :3], nodes["reference"][1:, :3]], axis=1)
-        ends = np.flatnonzero((nodes["goal"] == 1) & (nodes["dead"] == 0))
-        path: list[int] = []
-        i = int(ends[np.argmin(nodes["time"][ends])]) if len(ends) else 0
-        while i > 0:
-            path.append(i - 1)
-            i = int(nodes["parent"][i])
-        return TreeView(edges, nodes["state"][1:, 2] > 0.0, nodes["time"][1:], np.array(path[::-1], np.intp))
+        return tree_view(work.nodes[:size])

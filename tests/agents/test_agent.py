@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from stable_baselines3 import PPO, SAC
+from sb3_contrib import TQC
+from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv
 
@@ -42,13 +43,29 @@ def rewrite(folder, **changes):
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "policy"), [(PPO, {}), (PPO, {"activation_fn": Tanh, "net_arch": [128, 128]}), (SAC, {})]
+    ("algorithm", "policy"),
+    [
+        (PPO, {}),
+        (PPO, {"activation_fn": Tanh, "net_arch": [128, 128]}),
+        (SAC, {}),
+        (SAC, {"activation_fn": torch.nn.Tanh, "net_arch": [32]}),
+        (TD3, {}),
+        (TQC, {"net_arch": {"pi": [48, 32], "qf": [16]}}),
+    ],
 )
 def test_actions_are_those_of_the_model(tmp_path, algorithm, policy):
     model = exported(tmp_path / "agent", algorithm, **policy)
     agent = load_agent(tmp_path / "agent")
     seen = np.random.default_rng(0).uniform(-2.0, 2.0, (500, 68)).astype(np.float32)
     np.testing.assert_allclose(agent.relative_action(seen), model.predict(seen, deterministic=True)[0], atol=1e-5)
+
+
+def test_models_that_cannot_be_exported():
+    rows = HydroneVecEnv(ID, 2)
+    with pytest.raises(ValueError, match="must be one of PPO, SAC, TD3, TQC, got A2C"):
+        export_agent(A2C("MlpPolicy", rows, device="cpu"), "test", ID)
+    with pytest.raises(ValueError, match="only multilayer perceptrons with one kind of activation"):
+        export_agent(SAC("MlpPolicy", rows, device="cpu", policy_kwargs={"activation_fn": torch.nn.ELU}), "test", ID)
 
 
 def test_a_flight_is_the_same_on_both_interfaces(folder):

@@ -9,7 +9,7 @@ import yaml
 
 from agents import load_agent
 from hydrone_gym.cli import main
-from tests.agents.test_training import SMALL
+from tests.agents.test_training import RECIPES, SMALL
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -38,6 +38,19 @@ def test_train_then_shield_then_resume(tmp_path, recipe, capsys):
     assert main(["train", "--resume", str(second)]) == 0
     printed = capsys.readouterr()
     assert "HydroneGym/AirToWater-v0" in printed.out
+
+
+@pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
+def test_train_off_policy(tmp_path, capsys, algorithm):
+    recipe = tmp_path / "off_policy.yml"
+    recipe.write_text(yaml.safe_dump(RECIPES[algorithm]))
+    out = tmp_path / "run"
+    options = ["--recipe", str(recipe), "--evaluation-episodes", "2", "--num-threads", "1", "--json"]
+    assert main(["train", algorithm, "--out", str(out), *options]) == 0
+    assert len(json.loads(capsys.readouterr().out)["scores"]) == 3
+    agent = load_agent(out / "agent").file
+    assert (agent.algorithm, agent.network.output) == (algorithm.upper(), "tanh")
+    assert [path.name for path in (out / "checkpoints").iterdir()] == ["step_0000002304"]
 
 
 def test_bad_options(tmp_path, capsys):

@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,15 @@ import pytest
 import torch
 import yaml
 
-from agents import training
+from agents import run_log, training
 from agents.activation import Tanh
 from agents.agent_file import read_agent
+from agents.algorithms import ALGORITHMS
 from agents.checkpoint import checkpoints
 from agents.evaluation import HELD_OUT, MISSIONS
 from agents.mission_mix import MissionMix
-from agents.recipe import ENV_ID, load_recipe
+from agents.recipe import ENV_ID, FOLDER, load_recipe
+from agents.replay import load_replay, save_replay
 from agents.run_log import RunLog
 from agents.training import TrainingRun, resume, train
 
@@ -34,13 +37,34 @@ SMALL = {
     "missions": {ENV_ID: 32, "HydroneGym/AirToWater-v0": 16},
 }
 PERIOD = 48 * 8  # steps an update
+OFF_POLICY = {
+    ENV_ID: {
+        "n_envs": 48,
+        "n_timesteps": 48 * 8 * 6,
+        "policy": "MlpPolicy",
+        "train_freq": 2,
+        "gradient_steps": 1,
+        "batch_size": 64,
+        "buffer_size": 48 * 30,  # less than the run: the buffer comes round
+        "learning_starts": 2 * PERIOD,
+        "learning_rate": "lin_1e-3",
+        "n_steps": 3,
+        "policy_kwargs": {"net_arch": [16]},
+    },
+    "missions": SMALL["missions"],
+}
+NOISY = {**OFF_POLICY, ENV_ID: {**OFF_POLICY[ENV_ID], "noise_type": "normal", "noise_std": 0.2}}
+RECIPES = {"ppo": SMALL, "sac": OFF_POLICY, "td3": NOISY, "tqc": OFF_POLICY}
+
+
+def written(path, content):
+    path.write_text(yaml.safe_dump(content))
+    return path
 
 
 @pytest.fixture
 def recipe(tmp_path):
-    path = tmp_path / "small.yml"
-    path.write_text(yaml.safe_dump(SMALL))
-    return path
+    return written(tmp_path / "small.yml", SMALL)
 
 
 def small_run(folder, recipe, **changes):
@@ -72,28 +96,74 @@ def test_a_run_folder_is_complete(tmp_path, recipe):
         train(small_run(folder, recipe))
 
 
-def test_killed_and_resumed_is_never_stopped(tmp_path, recipe, monkeypatch):
-    """A run killed in the middle of a rollout goes on from its checkpoint to the very same weights and curve."""
-    train(small_run(tmp_path / "whole", recipe))
+@pytest.mark.parametrize(
+    ("algorithm", "killed_at"), [("ppo", 3.5), ("sac", 1.5), ("sac", 4.5), ("td3", 4.5), ("tqc", 4.5)]
+)
+def test_killed_and_resumed_is_never_stopped(tmp_path, monkeypatch, algorithm, killed_at):
+    """A run killed in the middle of a rollout goes on from its checkpoint to the very same weights and curve.
+
+    Off-policy algorithms are killed while actions are still drawn blindly, and after their replay buffer came round.
+    """
+    monkeypatch.setattr(run_log, "LINES", 6)
+    recipe = written(tmp_path / "small.yml", RECIPES[algorithm])
+    settings = {"algorithm": algorithm, "checkpoint_every": PERIOD - 100}  # due before a line of the curve is
+    train(small_run(tmp_path / "whole", recipe, **settings))
 
     class KilledError(Exception):
         pass
 
     def dies(self, step=RunLog._on_step):
-        if self.num_timesteps > 3.5 * PERIOD:
+        if self.num_timesteps > killed_at * PERIOD:
             raise KilledError
         return step(self)
 
     with monkeypatch.context() as patch:
         patch.setattr(RunLog, "_on_step", dies)
         with pytest.raises(KilledError):
-            train(small_run(tmp_path / "halves", recipe))
+            train(small_run(tmp_path / "halves", recipe, **settings))
     torch.manual_seed(99)
     np.random.seed(99)  # noqa: NPY002
-    resume(tmp_path / "halves", progress=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        resume(tmp_path / "halves", progress=False)
     for a, b in zip(layers(tmp_path / "whole"), layers(tmp_path / "halves"), strict=True):
         np.testing.assert_array_equal(a, b)
     assert curve(tmp_path / "whole") == curve(tmp_path / "halves")
+    assert [int(line["steps"]) for line in curve(tmp_path / "whole")] == [PERIOD * k for k in range(1, 7)]
+
+
+@pytest.mark.parametrize("steps", [20, 30, 75])
+def test_a_replay_buffer_survives_its_file(tmp_path, steps):
+    """Not yet full, just full, and come round twice."""
+    rows = MissionMix({ENV_ID: 6}, {"time_limit": 4.0})
+    arguments = {"learning_starts": 10**6, "buffer_size": 180, "n_steps": 3, "seed": 0, "device": "cpu"}
+    model = ALGORITHMS["sac"].model("MlpPolicy", rows, **arguments)
+    model.learn(6 * steps)
+    save_replay(model.replay_buffer, tmp_path / "replay.npz")
+    other = ALGORITHMS["sac"].model("MlpPolicy", rows, **arguments)
+    load_replay(other.replay_buffer, tmp_path / "replay.npz")
+    assert model.replay_buffer.timeouts.any()
+    for name, value in vars(model.replay_buffer).items():
+        np.testing.assert_array_equal(value, getattr(other.replay_buffer, name), err_msg=name)
+    observations = model.replay_buffer.observations[: min(steps, 30)].nbytes
+    assert (tmp_path / "replay.npz").stat().st_size < 1.5 * observations + 4000
+
+
+def test_time_outs_are_bootstrapped():
+    """The replay buffer holds the last observation of an ended row, and a time-out does not count as an end."""
+    rows = MissionMix({ENV_ID: 8}, {"time_limit": 4.0})
+    model = ALGORITHMS["sac"].model("MlpPolicy", rows, learning_starts=10**6, buffer_size=8 * 40, seed=0, device="cpu")
+    model.learn(8 * 20)
+    buffer = model.replay_buffer
+    timeouts = np.argwhere(buffer.timeouts[:20])
+    assert len(timeouts) > 4
+    for step, row in timeouts:
+        assert buffer.dones[step, row]
+        last, first = buffer.next_observations[step, row], buffer.observations[step + 1, row]
+        assert np.abs(last - first).max() > 0.1  # the next episode began elsewhere
+        assert np.abs(last[:3] - buffer.observations[step, row, :3]).max() < 0.4  # 2 m, in fifths
+    sample = buffer._get_samples(timeouts[:, 0])
+    assert sample.dones.sum() <= buffer.dones[timeouts[:, 0]].sum() - len(timeouts)
 
 
 def test_seeds(tmp_path, recipe):
@@ -132,6 +202,8 @@ def test_bad_runs(tmp_path, recipe):
         ("a: [", "no YAML"),
         ("a: 1", "needs an entry"),
         ("HydroneGym/Mission-v0: {n_envs: 4}", "lacks n_timesteps, policy"),
+        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P, policy_kwargs: dict()}", "code is not run"),
+        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P, noise_type: ou}", "must be 'normal', got 'ou'"),
         ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P}\nmissions: {a: 3}", "must sum to n_envs = 4"),
     ],
 )
@@ -142,13 +214,35 @@ def test_bad_recipes(tmp_path, text, message):
         load_recipe("ppo", path)
 
 
-def test_the_packaged_recipe():
-    recipe = load_recipe("ppo")
-    assert recipe.rows == 512
-    schedule = recipe.arguments()["learning_rate"]
+def test_the_packaged_recipes():
+    assert sorted(file.stem for file in FOLDER.glob("*.yml")) == sorted(ALGORITHMS)
+    schedule = load_recipe("ppo").arguments()["learning_rate"]
     assert (schedule(1.0), schedule(0.5), schedule(0.0)) == (5e-4, 2.5e-4, 0.0)
+    noise = load_recipe("td3").arguments()["action_noise"]
+    assert noise().shape == (3,)
     names = {spec.name for spec in dataclasses.fields(TrainingRun)}
     assert {"seed", "steps", "threads"} <= names
+
+
+@pytest.mark.parametrize("name", ["sac", "td3", "tqc"])
+def test_packaged_recipes_suit_their_algorithms(name, monkeypatch, tmp_path):
+    """What a recipe says reaches the model."""
+    seen = []
+    monkeypatch.setattr(training, "_learn", lambda run, recipe, model, spent: seen.append(model))
+    train(TrainingRun(folder=tmp_path / "run", algorithm=name))
+    (model,) = seen
+    assert type(model) is ALGORITHMS[name].model
+    assert model.replay_buffer.n_steps == 5
+    assert model.replay_buffer.handle_timeout_termination
+    assert {type(module) for module in model.policy.actor.modules()} >= {torch.nn.ReLU}
+
+
+def test_tensorboard(tmp_path, recipe, monkeypatch):
+    train(small_run(tmp_path / "run", recipe, tensorboard=True))
+    assert list((tmp_path / "run" / "tensorboard").rglob("events.out.tfevents.*"))
+    monkeypatch.setattr(training, "find_spec", lambda _: None)
+    with pytest.raises(ValueError, match=r'pip install "hydrone-gym\[tensorboard\]"'):
+        small_run(tmp_path / "other", recipe, tensorboard=True)
 
 
 def test_mission_mix_is_its_parts():

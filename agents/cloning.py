@@ -1,0 +1,269 @@
+"""Behaviour cloning: the egocentric policy network learns what a demonstrator did, by regression.
+
+Successful flights give the pairs: the egocentric observation of each period, and the relative action whose reference is
+nearest to the one flown. Mean squared error, Adam in minibatches, the rate falling linearly to zero; one thread, so a
+seed gives the same weights bit for bit. After Pomerleau, Neural Computation 3(1), 1991; its known weakness, that errors
+lead where nobody has flown, is that of this module too.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from agents.activation import Tanh
+from agents.agent import ACTIONS
+from agents.agent_file import TEXT, AgentFile, save_agent
+from agents.demonstration_files import find_datasets, load_demonstrations
+from agents.demonstrations import Demonstration, Demonstrations
+from agents.evaluation import MISSIONS
+from agents.network import Network
+from hydrone_gym.envs.egocentric import OBSERVATION_SIZE, Egocentric
+from hydrone_gym.envs.relative import STEP
+from hydrone_gym.evaluation import provenance
+from hydrone_gym.simulation.outcome import Outcome
+
+REPORT = "cloning.json"
+_PACKAGES = ("hydrone-gym", "torch", "gymnasium", "numpy", "numba", "minari")
+_LEVEL = 1e-6  # m: a shorter horizontal way from start to goal gives no direction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloning:
+    """What is learnt from, how, and where the agent goes.
+
+    Attributes:
+        data: folder of one dataset or of several, flown with the same options.
+        out: the agent's folder, made if missing; must not hold one.
+        seed: of the weights and of the order of the pairs.
+        hidden: outputs of each hidden layer.
+        epochs: times that every pair is learnt from.
+        batch: pairs a step.
+        learning_rate: of Adam at the beginning.
+        held_back: share of the flights that are not learnt from, to measure the error on.
+        progress: show a bar on stderr.
+
+    Raises:
+        ValueError: a number out of range.
+    """
+
+    data: Path
+    out: Path
+    seed: int = 0
+    hidden: tuple[int, ...] = (128, 128)
+    epochs: int = 400
+    batch: int = 512
+    learning_rate: float = 1e-3
+    held_back: float = 0.1
+    progress: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("epochs", "batch"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 0.0 < self.learning_rate < float("inf"):
+            raise ValueError(f"learning_rate must be positive and finite, got {self.learning_rate}")
+        if not 0.0 <= self.held_back < 1.0:
+            raise ValueError(f"held_back must lie in [0, 1), got {self.held_back}")
+
+
+class Pairs(NamedTuple):
+    """What is learnt from."""
+
+    observations: NDArray[np.float32]  # (n, 68) egocentric
+    actions: NDArray[np.float32]  # (n, 3) relative, in [-1, 1]
+    clipped: int  # pairs whose reference lay beyond the reach of a relative action
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloned:
+    """What came of it.
+
+    Attributes:
+        agent: as it was saved.
+        options: of the environments that were flown.
+        flights: successful ones, those learnt from and those held back.
+        pairs: learnt from.
+        clipped: share of all pairs whose reference lay beyond the reach of a relative action.
+        losses: (epochs,) mean squared error of the batches of each epoch.
+        held_back_loss: mean squared error on the flights held back; None if there are none.
+    """
+
+    agent: AgentFile
+    options: dict[str, Any]
+    flights: tuple[int, int]
+    pairs: int
+    clipped: float
+    losses: list[float] = field(repr=False)
+    held_back_loss: float | None
+
+    def notes(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        names = ("flights", "pairs", "clipped", "losses", "held_back_loss", "options")
+        return {**{name: getattr(self, name) for name in names}, **self.agent.notes}
+
+    def summary(self) -> str:
+        """Return it in one line."""
+        held_back = "" if self.held_back_loss is None else f", {self.held_back_loss:.4f} on {self.flights[1]} held back"
+        return (
+            f"{self.pairs} pairs of {self.flights[0]} flights, {100.0 * self.clipped:.1f} % clipped; "
+            f"mean squared error {self.losses[0]:.4f} in the first epoch, {self.losses[-1]:.4f} in the last{held_back}"
+        )
+
+
+def relative_actions(
+    references: NDArray, states: NDArray[np.float64], start: NDArray[np.float64], goal: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Undo `Egocentric.reference`: return the relative actions (n, 3), not clipped, that stand for references.
+
+    Args:
+        references: (n, 4) m, m, m, rad; the yaw is not used.
+        states: (n, 12) of the moments they answer.
+        start: (3,) where the episode started, m.
+        goal: (3,) m.
+    """
+    away = goal[:2] - start[:2]
+    length = np.hypot(*away)
+    cosine, sine = away / length if length >= _LEVEL else (1.0, 0.0)
+    x, y, z = (np.asarray(references, np.float64)[:, :3] - states[:, :3]).T
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=1) / STEP
+
+
+def pairs_of(flights: list[Demonstration], egocentric: Egocentric) -> Pairs:
+    """Return the pairs of flights, those of the periods in order.
+
+    Args:
+        flights: at least one.
+        egocentric: of the environment that was flown.
+    """
+    seen, wanted = [], []
+    for flight in flights:
+        raw, memory = flight.observations, None
+        for k in range(len(flight.actions)):
+            observation, memory = egocentric.observe({key: values[k] for key, values in raw.items()}, memory)
+            seen.append(observation)
+        states, goal = raw["state"][:-1], raw["goal"][0]
+        wanted.append(relative_actions(flight.actions, states, states[0, :3], goal))
+    actions = np.concatenate(wanted)
+    clipped = int((np.abs(actions) > 1.0).any(axis=1).sum())
+    return Pairs(np.array(seen), np.clip(actions, -1.0, 1.0).astype(np.float32), clipped)
+
+
+def clone(cloning: Cloning) -> Cloned:
+    """Learn from demonstrations, write the agent's folder and return what came of it.
+
+    Raises:
+        FileExistsError: the folder holds an agent already.
+        FileNotFoundError: no demonstrations.
+        ValueError: damaged ones, some flown with other options than the rest, or too few that arrived.
+    """
+    if (cloning.out / TEXT).exists():
+        raise FileExistsError(f"{cloning.out} holds an agent already: name another folder")
+    datasets = [load_demonstrations(folder) for folder in find_datasets(cloning.data)]
+    options = datasets[0].options
+    if any(dataset.options != options for dataset in datasets):
+        raise ValueError(f"{cloning.data}: demonstrations must have been flown with the same options")
+    learnt, held_back = _split(datasets, cloning)
+    egocentric = Egocentric(datasets[0].make_env().get_wrapper_attr("simulation"))
+    pairs = pairs_of(learnt, egocentric)
+    layers, losses = fit(pairs, cloning)
+    clipped, count, loss = pairs.clipped, len(pairs.actions), None
+    if held_back:
+        kept = pairs_of(held_back, egocentric)
+        clipped, count = clipped + kept.clipped, count + len(kept.actions)
+        loss = float(np.mean((_network_of(layers)(kept.observations) - kept.actions) ** 2))
+    cloned = Cloned(
+        agent=_agent_of(layers, datasets, cloning),
+        options=options,
+        flights=(len(learnt), len(held_back)),
+        pairs=len(pairs.actions),
+        clipped=clipped / count,
+        losses=losses,
+        held_back_loss=loss,
+    )
+    save_agent(cloned.agent, cloning.out)
+    (cloning.out / REPORT).write_text(json.dumps(cloned.notes(), indent=1) + "\n", encoding="utf-8")
+    return cloned
+
+
+def _split(datasets: list[Demonstrations], cloning: Cloning) -> tuple[list[Demonstration], list[Demonstration]]:
+    """Return the successful flights to learn from, and those to hold back: the last of each dataset."""
+    learnt, held_back = [], []
+    for dataset in datasets:
+        arrived = [flight for flight in dataset.flights if flight.outcome is Outcome.GOAL]
+        first = len(arrived) - int(cloning.held_back * len(arrived))
+        learnt += arrived[:first]
+        held_back += arrived[first:]
+    if not learnt:
+        raise ValueError(f"{cloning.data}: no flight arrived, there is nothing to learn from")
+    return learnt, held_back
+
+
+def fit(pairs: Pairs, cloning: Cloning) -> tuple[torch.nn.Sequential, list[float]]:
+    """Return the trained layers, and the mean squared error of each epoch; sets torch to one thread."""
+    torch.set_num_threads(1)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(cloning.seed)
+        layers = _layers(cloning.hidden)
+        inputs, outputs = torch.from_numpy(pairs.observations), torch.from_numpy(pairs.actions)
+        steps = cloning.epochs * -(-len(inputs) // cloning.batch)
+        adam = torch.optim.Adam(layers.parameters(), lr=cloning.learning_rate)
+        falling = torch.optim.lr_scheduler.LinearLR(adam, 1.0, 1.0 / steps, total_iters=steps)
+        losses = []
+        for _ in tqdm(range(cloning.epochs), desc="cloning", unit="epoch", disable=not cloning.progress):
+            total = 0.0
+            for rows in torch.randperm(len(inputs)).split(cloning.batch):
+                loss = torch.nn.functional.mse_loss(layers(inputs[rows]), outputs[rows])
+                adam.zero_grad()
+                loss.backward()
+                adam.step()
+                falling.step()
+                total += float(loss.detach()) * len(rows)
+            losses.append(total / len(inputs))
+    return layers, losses
+
+
+def _layers(hidden: tuple[int, ...]) -> torch.nn.Sequential:
+    """Return a multilayer perceptron, observation to action, with new weights."""
+    sizes = (OBSERVATION_SIZE, *hidden)
+    layers: list[torch.nn.Module] = []
+    for inputs, outputs in pairwise(sizes):
+        layers += [torch.nn.Linear(inputs, outputs), Tanh()]
+    return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], ACTIONS))
+
+
+def _arrays(layers: torch.nn.Sequential, name: str) -> Iterator[NDArray[np.float32]]:
+    for layer in layers:
+        if isinstance(layer, torch.nn.Linear):
+            yield np.ascontiguousarray(getattr(layer, name).detach().numpy().T)
+
+
+def _network_of(layers: torch.nn.Sequential) -> Network:
+    weights, biases = tuple(_arrays(layers, "weight")), tuple(_arrays(layers, "bias"))
+    return Network(weights=weights, biases=biases, activation="tanh", output="linear")
+
+
+def _agent_of(layers: torch.nn.Sequential, datasets: list[Demonstrations], cloning: Cloning) -> AgentFile:
+    """Return the agent with what it was learnt from."""
+    sources = [{"env_id": each.env_id, "policy": each.policy, "sha256": each.sha256} for each in datasets]
+    settings = {"seed": cloning.seed, "epochs": cloning.epochs, "batch": cloning.batch}
+    return AgentFile(
+        name=cloning.out.name,
+        algorithm="behaviour cloning",
+        environment=MISSIONS[0],
+        network=_network_of(layers),
+        notes={
+            **settings,
+            "learning_rate": cloning.learning_rate,
+            "demonstrations": sources,
+            "versions": provenance.versions(_PACKAGES),
+        },
+    )

@@ -1,0 +1,190 @@
+"""The subcommand `hydrone replay`: a flight as a page that plays in a browser."""
+
+import json
+import sys
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+import tyro
+from gymnasium.error import DependencyNotInstalled
+
+from hydrone_gym.cli.compiling import announce_compiling, kernels_of
+from hydrone_gym.cli.missions import MissionOptions
+from hydrone_gym.evaluation.flight import Flight, fly
+from hydrone_gym.evaluation.policies import find_policy, known_policies
+from hydrone_gym.evaluation.records import Record, record_of
+from hydrone_gym.evaluation.replays import fly_again, place_of, plan_of, same_flight
+from hydrone_gym.evaluation.saved import SavedFlight, read_flights, restore
+from hydrone_gym.evaluation.stored import read_stored
+from hydrone_gym.rendering.replay import load_viser, write_replay
+from hydrone_gym.simulation.simulation import Simulation
+from planners import TreeRecorder, TreeView
+
+_OF_FILES, _OF_EVALUATIONS = {"flight"}, {"suite", "mission", "world"}
+_OF_PAGES = {"saved", "out", "open", "json"}
+
+
+class Take(NamedTuple):
+    """What one page shows."""
+
+    name: str
+    title: str
+    flight: Flight
+    simulation: Simulation
+    trees: Sequence[TreeView]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay(MissionOptions):
+    """Write a flight as a page that plays in a browser, offline: a fresh flight, a saved one, one of an evaluation."""
+
+    saved: tyro.conf.Positional[Path | None] = None
+    """A flight.json of `hydrone fly`, or the folder of an evaluation; without it, a fresh flight."""
+    flight: str | None = None
+    """Of a flight.json: only the flight of this name."""
+    suite: str | None = None
+    """Of an evaluation: the suite, if there are several."""
+    mission: str | None = None
+    """Of an evaluation: the mission, if there are several."""
+    world: int | None = None
+    """Of an evaluation: the number of the world; --policy is the name in its tables."""
+    out: Path = Path("replay.html")
+    """File to write, or folder for it; for several flights their names are appended."""
+    open: bool = False
+    """Open the page in the browser."""
+    json: bool = False
+    """Print one JSON document instead of the names of the files."""
+
+    def run(self) -> int:
+        """Fly, write the pages and return the exit code."""
+        try:
+            load_viser()
+            takes = self._takes()
+            pages = self._write(takes)
+        except (ValueError, OSError, DependencyNotInstalled) as error:
+            print(f"hydrone: error: {error}", file=sys.stderr)
+            return 2
+        if self.json:
+            shown = [_described(take, page) for take, page in zip(takes, pages, strict=True)]
+            print(json.dumps({"format": "hydrone_gym replays", "version": 1, "replays": shown}, indent=1))
+        else:
+            for page in pages:
+                print(page)
+        for page in pages if self.open else ():
+            webbrowser.open(page.resolve().as_uri())
+        return 0
+
+    def _takes(self) -> list[Take]:
+        """Fly what is asked for."""
+        if self.saved is None:
+            self._refuse(_OF_FILES | _OF_EVALUATIONS, "a fresh flight")
+            return self._fresh()
+        if self.saved.is_dir():
+            kept = _OF_EVALUATIONS | {"policy"}
+            self._refuse({field.name for field in fields(self)} - kept - _OF_PAGES, "an evaluation")
+            return [self._evaluated(self.saved)]
+        kept = _OF_FILES | _OF_PAGES
+        self._refuse({field.name for field in fields(self)} - kept, "a saved flight")
+        flights = read_flights(self.saved)
+        chosen = [saved for saved in flights if self.flight in (None, saved.name)]
+        if not chosen:
+            names = ", ".join(saved.name for saved in flights)
+            raise ValueError(f"--flight must be one of {names}, got {self.flight!r}")
+        return [_replayed(saved) for saved in chosen]
+
+    def _refuse(self, names: set[str], source: str) -> None:
+        """Raise ValueError if one of these options was given another value than its default."""
+        given = sorted(f.name for f in fields(self) if f.name in names and getattr(self, f.name) != f.default)
+        if given:
+            raise ValueError(
+                f"{', '.join('--' + name.replace('_', '-') for name in given)} cannot be used with {source}"
+            )
+
+    def _fresh(self) -> list[Take]:
+        """Fly the missions of the options."""
+        takes = []
+        for mission in self.missions():
+            recorder = TreeRecorder(mission.policy)
+            flight = fly(mission.env, recorder, seed=self.seed, scenario=mission.scenario)
+            title = f"{_spoken(mission.name)}, {self.policy}, seed {self.seed}"
+            takes.append(Take(mission.name, title, flight, mission.env.get_wrapper_attr("simulation"), recorder.trees))
+        return takes
+
+    def _evaluated(self, folder: Path) -> Take:
+        """Fly a row of an evaluation again."""
+        stored = read_stored(folder)
+        record, plan = self._row(stored.records), plan_of(stored.arguments)
+        source = next(source for source in plan.policies if source.label == record.policy)
+        announce_compiling(*kernels_of(source))
+        recorders: list[TreeRecorder] = []
+
+        def recorded(env: gym.Env, seed: int) -> TreeRecorder:
+            recorders.append(TreeRecorder(source.make(env, seed)))
+            return recorders[-1]
+
+        plan = replace(plan, policies=(replace(source, factory=recorded, folder=""),))
+        flight, simulation = fly_again(record, plan)
+        if not same_flight(record, record_of(record.key, flight)):
+            print("hydrone: this flight differs from its row: code or clock led elsewhere", file=sys.stderr)
+        title = f"{record.policy}: {place_of(record)}"
+        return Take(f"{record.policy}-{record.mission}-{record.world}", title, flight, simulation, recorders[-1].trees)
+
+    def _row(self, records: Sequence[Record]) -> Record:
+        """Return the one row that the options name; ValueError where none or several fit."""
+        for name in ("policy", "suite", "mission", "world"):
+            wanted, there = getattr(self, name), list(dict.fromkeys(getattr(record, name) for record in records))
+            if wanted is None and len(there) == 1:
+                continue
+            if wanted not in there:
+                known = ", ".join(map(str, there[:12])) + (", …" if len(there) > 12 else "")
+                raise ValueError(f"--{name} must be one of {known}, got {wanted!r}")
+            records = [record for record in records if getattr(record, name) == wanted]
+        return records[0]
+
+    def _write(self, takes: list[Take]) -> list[Path]:
+        """Write the pages; return their paths."""
+        out = self.out if self.out.suffix == ".html" else self.out / "replay.html"
+        out.parent.mkdir(parents=True, exist_ok=True)
+        pages = [out if len(takes) == 1 else out.with_name(f"{out.stem}-{take.name}.html") for take in takes]
+        for take, page in zip(takes, pages, strict=True):
+            write_replay(take.flight, take.simulation, page, title=take.title, trees=take.trees)
+        return pages
+
+
+def _replayed(saved: SavedFlight) -> Take:
+    """Fly a saved flight again from its references, and its planner for the trees."""
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
+    simulation = env.get_wrapper_attr("simulation")
+    flight = restore(saved, simulation)
+    title = f"{_spoken(saved.name)}, {saved.policy}, seed {saved.seed}"
+    return Take(saved.name, title, flight, simulation, _trees(saved, env))
+
+
+def _trees(saved: SavedFlight, env: gym.Env) -> Sequence[TreeView]:
+    """Return the trees of a saved flight, none where its policy is not a registered one or flies otherwise now."""
+    if saved.policy not in known_policies():
+        return ()
+    source = find_policy(saved.policy)
+    announce_compiling(*kernels_of(source))
+    recorder = TreeRecorder(source.make(env, saved.seed))
+    flight = fly(env, recorder, seed=saved.seed, scenario=saved.scenario)
+    if np.array_equal(flight.states, saved.states):
+        return recorder.trees
+    print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
+    return ()
+
+
+def _spoken(name: str) -> str:
+    return name[:1].upper() + name[1:].replace("-", " ")
+
+
+def _described(take: Take, page: Path) -> dict[str, Any]:
+    """Return what --json prints of a page."""
+    flight = take.flight
+    facts = {"outcome": flight.outcome.name, "time": flight.time, "trees": sum(len(t.edges) > 0 for t in take.trees)}
+    return {"name": take.name, "title": take.title, "page": str(page), **facts}

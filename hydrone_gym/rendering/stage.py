@@ -1,0 +1,221 @@
+"""What a replay page shows, as nodes of a viser scene: what stands still, and what moves with the moment.
+
+Three.js draws translucent nodes in the order of their origins, the farthest first, and what is hidden by one drawn
+before it is not drawn at all. So every translucent node has its origin in its middle, each side of the water is a node
+of its own, and unknown obstacles are two: those under water, in its middle, and those in the air.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from hydrone_gym.rendering import style
+from hydrone_gym.rendering.caption import describe
+from hydrone_gym.rendering.meshes import Mesh, ball, slab, vehicle, walls
+from hydrone_gym.rendering.moment import Moment
+from hydrone_gym.rendering.shapes import rgb
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.world.world import World
+
+VEHICLE_SCALE = 3.0  # times its true size
+GRID = 5.0  # m between the lines on the floor
+UNKNOWN, DETECTED = style.GLASS[0], "#2b2b2b"
+_SAND, _LINES, _ARM, _ROTOR = "#ded0ad", "#8b98a5", "#10283a", "#9fb2c2"
+_GONE = 1e-6  # scale of a sphere that is not there; 0 would leave it without normals
+_CHUNK = 20  # ticks of the path in one node: only the last one is sent anew at every tick
+_FINE = 128.0  # steps a metre in the vertices of trees: round numbers make small pages
+_GLASS = 0.5  # opacity
+
+
+class Tree(Protocol):
+    """A planner's tree in one period, such as `planners.TreeView`."""
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """References at both ends of each edge, (E, 2, 3) in m."""
+
+    @property
+    def air(self) -> NDArray[np.bool_]:
+        """Whether an edge ends in air, (E,)."""
+
+    @property
+    def path(self) -> NDArray[np.intp]:
+        """Edges of the path that is followed, in order."""
+
+
+class Stage:
+    """A mission as a viser scene.
+
+    Args:
+        scene: of a viser server, empty.
+        moment: the mission; only what never changes about it is used.
+        simulation: that of the flight, for its world, vehicle and period.
+    """
+
+    def __init__(self, scene: Any, moment: Moment, simulation: Simulation) -> None:
+        """Add everything that stands still, and what moves where it begins."""
+        self._scene, self._world = scene, simulation.world
+        self._obstacles = moment.obstacles
+        self._vehicle = self._add_vehicle(simulation.vehicle.arm * VEHICLE_SCALE)
+        self._reference = self._mesh("/reference", ball(0.14, rings=8), style.BLACK)
+        (x0, y0, bottom), (x1, y1, top) = simulation.world.lower, simulation.world.upper
+        x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        # on top of the box it is in view and in nobody's way
+        self._label = scene.add_label("/label", "", position=(x, y, top), anchor="center-center", font_screen_scale=1.2)
+        self._plumb = self._lines("/plumb", np.zeros((1, 2, 3)), "#5d6f7d", 1.0)
+        self._trees: dict[str, Any] = {}
+        self._path: Any = None
+        self._add_marks(moment, simulation.world)
+        self._add_box(simulation.world)
+        self._add_water(simulation.world)
+        wet = moment.obstacles[:, 2] < 0.0
+        self._known = [self._spheres("/obstacles/detected", np.ones(len(wet), bool), DETECTED)]
+        self._unknown = [
+            self._spheres("/obstacles/unknown, under water", wet, UNKNOWN, (x, y, 0.5 * bottom)),
+            self._spheres("/obstacles/unknown, in the air", ~wet, UNKNOWN, (x, y, 0.5 * top)),
+        ]
+
+    def show(self, moment: Moment) -> None:
+        """Move to a moment; to be called for every tick in order."""
+        state, reference = moment.ticks[-1, :12], moment.ticks[-1, 12:15]
+        turn = Rotation.from_euler("ZXY", state[[5, 3, 4]])
+        self._vehicle.position, self._vehicle.wxyz = state[:3], turn.as_quat(scalar_first=True)
+        self._reference.position = reference
+        self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
+        self._label.text = ", ".join(describe(moment.time, state[2], self._world.zone, moment.outcome)[0].split("   "))
+        self._grow(moment.ticks[:, :3])
+        for group, there in ((self._known, moment.detected), (self._unknown, ~moment.detected)):
+            scales = np.where(there, self._obstacles[:, 3], _GONE).astype(np.float32)
+            for spheres, chosen in group:
+                if spheres is not None:
+                    spheres.batched_scales = scales[chosen]
+
+    def plan(self, tree: Tree) -> None:
+        """Show the tree of a period, and the path in it."""
+        edges, followed = np.round(_FINE * tree.edges) / _FINE, np.zeros(len(tree.edges), bool)
+        followed[tree.path] = True
+        parts = {
+            "/tree/air": (tree.air & ~followed, style.RED, 1.0),
+            "/tree/water": (~tree.air & ~followed, style.PURPLE, 1.0),
+            "/tree/plan": (followed, style.BLACK, 2.0),
+        }
+        for name, (chosen, colour, width) in parts.items():
+            # three.js cannot draw no edges: without one, what is there is not seen
+            points = edges[chosen] if chosen.any() else np.zeros((1, 2, 3))
+            if name in self._trees:
+                self._trees[name].points = points.astype(np.float32)
+            else:
+                self._trees[name] = self._lines(name, points, colour, width)
+            self._trees[name].visible = bool(chosen.any())
+
+    def _grow(self, path: NDArray[np.float64]) -> None:
+        """Add the last tick to the path."""
+        ticks = len(path) - 1
+        if ticks == 0:
+            return
+        first = (ticks - 1) // _CHUNK * _CHUNK
+        edges = np.stack((path[first:-1], path[first + 1 :]), axis=1)
+        if ticks - first == 1:
+            self._path = self._lines(f"/path/{first}", edges, style.RED, 4.0)
+        else:
+            self._path.points = edges.astype(np.float32)
+
+    def _add_vehicle(self, arm: float) -> Any:
+        """Add the vehicle; return the frame it moves with."""
+        frame = self._scene.add_frame("/vehicle", show_axes=False)
+        parts = vehicle(arm)
+        for name, mesh, colour in (
+            ("frame", parts.frame, _ARM),
+            ("front", parts.front, style.RED),
+            ("rotors", parts.rotors, _ROTOR),
+        ):
+            self._mesh(f"/vehicle/{name}", mesh, colour)
+        return frame
+
+    def _add_marks(self, moment: Moment, world: World) -> None:
+        """Add start and goal, each with a line to the surface."""
+        start, goal = moment.ticks[0, :3], moment.goal
+        self._mesh("/start", ball(0.2, start, rings=8), style.BLACK)
+        self._mesh("/goal/middle", ball(0.2, goal, rings=8), style.PURPLE)
+        feet = np.stack((start, start * [1.0, 1.0, 0.0], goal, goal * [1.0, 1.0, 0.0])).reshape(2, 2, 3)
+        self._lines("/goal/plumb", feet[1:], style.PURPLE, 1.0)
+        self._lines("/start/plumb", feet[:1], "#5d6f7d", 1.0)
+        self._mesh("/goal/reach", ball(world.goal_radius, goal), style.PURPLE, opacity=0.35)
+
+    def _add_box(self, world: World) -> None:
+        """Add the box and its floor."""
+        (x0, y0, z0), (x1, y1, _) = world.lower, world.upper
+        self._mesh("/box/floor", slab(z0 - 0.02, world.lower, world.upper), _SAND, side="double")
+        self._lines("/box/edges", _edges(world), _LINES, 1.5)
+        across = [[(x, y0, z0), (x, y1, z0)] for x in np.arange(x0, x1 + 0.5 * GRID, GRID)]
+        along = [[(x0, y, z0), (x1, y, z0)] for y in np.arange(y0, y1 + 0.5 * GRID, GRID)]
+        self._lines("/box/grid", np.array(across + along), _LINES, 1.0)
+
+    def _add_water(self, world: World) -> None:
+        """Add water, surface and transition zone."""
+        lower, upper, zone = world.lower, world.upper, world.zone
+        self._mesh("/water/surface", slab(0.0, lower, upper), style.WATER, opacity=0.40, side="double")
+        for name, (low, high), colour, opacity in (
+            ("water/side", (lower[2], -zone), style.WATER, 0.20),
+            ("water/transition zone, below", (-zone, 0.0), style.BLUE, 0.25),
+            ("water/transition zone, above", (0.0, zone), style.BLUE, 0.12),
+        ):
+            for k, wall in enumerate(walls(lower, upper, low, high)):
+                self._mesh(f"/{name} {k}", wall, colour, opacity=opacity, side="double")
+
+    def _spheres(
+        self,
+        name: str,
+        chosen: NDArray[np.bool_],
+        colour: str,
+        origin: tuple[float, float, float] | None = None,
+    ) -> tuple[Any, NDArray[np.bool_]]:
+        """Add some of the obstacles in one look, none of them there yet; return them, None for none, and which.
+
+        With an origin (m) they are glass.
+        """
+        if not chosen.any():
+            return None, chosen
+        mesh, count, middle = ball(1.0), int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
+        spheres = self._scene.add_batched_meshes_simple(
+            name,
+            mesh.vertices,
+            mesh.faces,
+            np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            self._obstacles[chosen, :3] - middle,
+            batched_scales=np.full(count, _GONE),
+            batched_colors=rgb(colour),
+            opacity=None if origin is None else _GLASS,
+            position=middle,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        return spheres, chosen
+
+    def _mesh(self, name: str, mesh: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
+        """Add a mesh; one that is translucent has its origin in its middle."""
+        middle = np.zeros(3) if opacity is None else mesh.vertices.mean(axis=0)
+        return self._scene.add_mesh_simple(
+            name,
+            mesh.vertices - middle,
+            mesh.faces,
+            position=middle,
+            color=rgb(colour),
+            opacity=opacity,
+            side=side,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def _lines(self, name: str, points: NDArray[np.float64], colour: str, width: float) -> Any:
+        """Add edges (n, 2, 3), so many pixels wide."""
+        return self._scene.add_line_segments(name, points, rgb(colour), thickness=width, thickness_units="screen")
+
+
+def _edges(world: World) -> NDArray[np.float64]:
+    """Return the edges of the box, those that stand twice, (16, 2, 3)."""
+    sides = walls(world.lower, world.upper, world.lower[2], world.upper[2])
+    return np.concatenate([np.stack((side.vertices, np.roll(side.vertices, -1, axis=0)), axis=1) for side in sides])
