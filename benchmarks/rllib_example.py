@@ -64,7 +64,10 @@ def run(settings: Settings) -> dict[str, Any]:
             text=True,
             timeout=settings.seconds,
             cwd=settings.cache,
-            env={**os.environ, "NUMBA_CACHE_DIR": str(settings.cache.resolve() / "numba")},  # its Numba may be another
+            env={
+                **os.environ,
+                "XDG_CACHE_HOME": str(settings.cache.resolve()),
+            },  # kernels of its Numba, beside nobody else's
             check=False,
         )
     except subprocess.TimeoutExpired:
