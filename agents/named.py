@@ -21,6 +21,11 @@ def sac(env: Any) -> Agent:
     return load_agent("sac", env)
 
 
+def sac_shield(env: Any) -> Shield:
+    """Return that agent behind the shield."""
+    return Shield.for_env(load_agent("sac", env), env)
+
+
 def from_folder(folder: str, env: Any) -> Agent:
     """Return the agent that training wrote to a folder."""
     return load_agent(folder, env)
