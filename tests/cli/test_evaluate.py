@@ -14,7 +14,11 @@ from hydrone_gym import cli
 from hydrone_gym.evaluation import DEFAULT_POLICIES, evaluate, read_records
 from tests.evaluation.test_run import timeless
 
-PROGRAM = "import sys; from hydrone_gym.cli import main; sys.exit(main())"
+# A process that a script started in the background ignores Ctrl-C unless it asks for it.
+PROGRAM = (
+    "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
+    "from hydrone_gym.cli import main; sys.exit(main())"
+)
 TWO = ["--policies", "straight-line", "straight-line-shield", "--jobs", "1"]
 
 # What somebody writes who has read docs/evaluation.md and nothing else.
