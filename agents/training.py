@@ -6,9 +6,7 @@ for `agents.load_agent`, and `evaluation.json` with its success on held-out worl
 
 import dataclasses
 import json
-import platform
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -25,6 +23,7 @@ from agents.export import export_agent
 from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, Recipe, load_recipe
 from agents.run_log import CHECKPOINTS, RunLog, draw_curve
+from hydrone_gym.evaluation.provenance import versions
 
 CONFIG = "config.yaml"
 TENSORBOARD = "tensorboard"
@@ -146,7 +145,7 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
         model.learn(left, callback=log, log_interval=interval, reset_num_timesteps=model.num_timesteps == 0)
     draw_curve(run.folder)
     folder, episodes = run.folder / "agent", run.evaluation_episodes
-    notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions()}
+    notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions(PACKAGES)}
     save_agent(export_agent(model, run.folder.name, ENV_ID, notes), folder)
     scores = []
     if episodes > 0:
@@ -162,15 +161,4 @@ def _write_config(run: TrainingRun, recipe: Recipe) -> None:
     described = {name: str(value) if isinstance(value, Path) else value for name, value in described.items()}
     content = {"run": described, "recipe": dataclasses.asdict(recipe)}
     (run.folder / CONFIG).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    (run.folder / "versions.json").write_text(json.dumps(versions(), indent=1) + "\n", encoding="utf-8")
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of everything that results depend on."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+    (run.folder / "versions.json").write_text(json.dumps(versions(PACKAGES), indent=1) + "\n", encoding="utf-8")

@@ -5,6 +5,7 @@ import pickle
 import warnings
 
 import gymnasium as gym
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -140,8 +141,6 @@ def test_render_fps_plays_at_the_speed_of_the_flight():
 
 
 def test_record_video(tmp_path):
-    pytest.importorskip("moviepy")
-    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     env = RecordVideo(gym.make(IDS[0], **SMALL), str(tmp_path / "films"), episode_trigger=lambda episode: True)
     env.reset(seed=1)
     for _ in range(7):

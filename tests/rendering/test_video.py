@@ -2,6 +2,7 @@
 
 import sys
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
@@ -41,7 +42,6 @@ def test_every_so_many_ticks_up_to_the_end(flown):
 
 
 def test_a_film_lasts_as_long_as_the_flight(flown, tmp_path):
-    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     flight, _ = flown
     path = tmp_path / "flight.mp4"
     save_film(frames(flight, size=SIZE, every=2), path, fps=10.0)

@@ -7,13 +7,13 @@ import time
 
 import gymnasium as gym
 import numpy as np
+import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
 from hydrone_gym.rendering.window import Window
 from tests.envs.missions import DIVE, IDS, begin, make, same
 
-pygame = pytest.importorskip("pygame")
 HOVER = np.array([*DIVE.start[:3], 0.0])
 
 
