@@ -10,6 +10,7 @@ from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rows import load_row, store_row
 from hydrone_gym.world.obstacles import swept_distance
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, hover_reference, inside
+from planners.clearance import clearance_between
 
 HELD = -1  # choice: no candidate was safe, the hover verified last goes on
 MARGIN = 0.05  # m of clearance that checked motion keeps
@@ -50,17 +51,6 @@ def _follow(row, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, m
     sensed = dx * dx + dy * dy + dz * dz <= reach * reach
     arrives = row.outcome == GOAL
     return (row.outcome == RUNNING or arrives) and row.clearance >= margin and smooth and sensed, arrives
-
-
-@inlined
-def _clearance(ax, ay, az, bx, by, bz, spheres, count, radius):
-    """Least clearance (m) of a straight path from the known spheres."""
-    least = np.inf
-    for j in range(count):
-        k = 4 * j
-        distance = swept_distance(ax, ay, az, bx, by, bz, spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
-        least = min(least, distance - radius)
-    return least
 
 
 @inlined
@@ -111,7 +101,7 @@ def _rests(row, eye, hover, spheres, closest, count, margin, ticks, model, block
         w = model.world
         if not (w.x_min < x < w.x_max and w.y_min < y < w.y_max):
             return False
-        return _clearance(s[0], s[1], s[2], x, y, s[2], spheres, count, model.vehicle.radius) >= margin
+        return clearance_between(s, (x, y, s[2]), spheres, 0, count, model.vehicle.radius) >= margin
     return True
 
 
@@ -160,7 +150,7 @@ def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, 
     for n in range(rows.size):
         row, s = rows[n], rows[n].state
         count = _near(s[0], s[1], s[2], spheres[n], near)
-        left = _clearance(s[0], s[1], s[2], s[0], s[1], s[2], near, count, model.vehicle.radius) - _GIVE
+        left = clearance_between(s, s, near, 0, count, model.vehicle.radius) - _GIVE
         margin = max(min(MARGIN, left), _LEAST)
         dx, dy, dz = proposed[n, 0] - s[0], proposed[n, 1] - s[1], proposed[n, 2] - s[2]
         choice[n] = HELD

@@ -11,15 +11,15 @@ from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from planners.cl_rrt.clearance import clearance_between
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, inside
 from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING
+from planners.clearance import clearance_between
 
 _SETTLE_LIMIT = 9.0  # s
 _CROSS_LIMIT = 12.0  # s
 _BEYOND = 1.3  # m: where the reference goes on the other side
-_STOP_TIME = 0.45  # s: stop distance over speed in air
+STOP_TIME = 0.45  # s: stop distance over speed in air
 # Lateral and vertical speed (m/s) at which the vehicle may leave the gate
 _STILL_AIR, _LEVEL_AIR = 0.3, 0.3
 _STILL_WATER, _LEVEL_WATER = 1.0, 0.8
@@ -46,7 +46,8 @@ def facing(x, y, to_x, to_y, psi):
 @inlined
 def column_is_free(work, x, y, radius, margin):
     """Whether a vertical path through the zone clears every known obstacle."""
-    return clearance_between(work, (x, y, AIR_GATE), (x, y, -WATER_GATE), 0, radius) >= margin
+    above, below = (x, y, AIR_GATE), (x, y, -WATER_GATE)
+    return clearance_between(above, below, work.obstacles, 0, work.closest.size, radius) >= margin
 
 
 @inlined
@@ -70,7 +71,7 @@ def cross(work, values, goal, source, size, sample_x, sample_y, objective, margi
     period = ticks * TICK
     s = work.nodes[source].state
     down = s[2] > 0.0
-    ahead = _STOP_TIME if down else 0.1
+    ahead = STOP_TIME if down else 0.1
     x = inside(s[0] + ahead * s[6], model.world.x_min, model.world.x_max)
     y = inside(s[1] + ahead * s[7], model.world.y_min, model.world.y_max)
     if not column_is_free(work, x, y, model.vehicle.radius, margin):

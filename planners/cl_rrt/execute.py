@@ -8,12 +8,12 @@ import numpy as np
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.simulation.model import unpack_model
-from planners.cl_rrt.clearance import clearance_between
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.references import hover_reference
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, copy_node, prune_orphans, reroot
+from planners.clearance import clearance_between
 
 _BEND = 0.1  # m: how far an edge may leave its chord
 _AT_GOAL = 1e9  # any path that arrives is better than any that does not
@@ -52,7 +52,7 @@ def prune_blocked(work, size, known_before, radius, margin):
         return
     for i in range(1, size):
         a, b = work.nodes[work.nodes[i].parent].state, work.nodes[i].state
-        if clearance_between(work, a, b, known_before, radius) < margin - _BEND:
+        if clearance_between(a, b, work.obstacles, known_before, work.closest.size, radius) < margin - _BEND:
             work.nodes[i].dead = 1
     prune_orphans(work.nodes, size)
 
@@ -64,7 +64,7 @@ def margin_here(work, radius, settings):
     Without this a vehicle that drifted or stopped within the margin could never move again.
     """
     state = work.nodes[0].state
-    left = clearance_between(work, state, state, 0, radius) - _GIVE
+    left = clearance_between(state, state, work.obstacles, 0, work.closest.size, radius) - _GIVE
     return max(min(settings.margin, left), _LEAST_MARGIN)
 
 
@@ -180,7 +180,7 @@ def verify_stop(work, values, goal, eye, first, settings, margin, ticks, model, 
     end = work.nodes[scratch].state
     if end[2] < 0.0:
         drifted = (end[0] + _DRIFT_TIME * end[6], end[1] + _DRIFT_TIME * end[7], end[2])
-        if clearance_between(work, end, drifted, 0, model.vehicle.radius) < margin:
+        if clearance_between(end, drifted, work.obstacles, 0, work.closest.size, model.vehicle.radius) < margin:
             return 0
     for c in range(4):
         work.backup[count, c] = work.nodes[scratch].reference[c]

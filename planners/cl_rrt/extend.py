@@ -6,11 +6,11 @@ from hydrone_gym._jit import inlined, routine
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.time_to_go import cruise_speeds
-from planners.cl_rrt.clearance import clearance_between
-from planners.cl_rrt.crossing import column_is_free, cross, facing
+from planners.cl_rrt.crossing import STOP_TIME, column_is_free, cross, facing
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, air_reference, water_reference
 from planners.cl_rrt.tree import OPEN
+from planners.clearance import clearance_between
 
 _AIR_REACHED = 0.4  # m
 _WATER_REACHED = 0.5  # m: more than the hold radius
@@ -23,11 +23,38 @@ def in_sight(work, node, x, y, z, radius, margin):
     A line costs a hundredth of the edges along it, so tries that would end at an obstacle are not begun.
     """
     s = node.state
+    change = (s[2] > 0.0) != (z > 0.0)
+    gate = AIR_GATE if s[2] > 0.0 else -WATER_GATE
+    point = (x, y, gate if change else z)
+    near = clearance_between(s, point, work.obstacles, 0, work.closest.size, radius)
+    return near >= margin and (not change or column_is_free(work, x, y, radius, margin))
+
+
+@inlined
+def aim_at(node, x, y, z, objective):
+    """Return the point (m) to go to for a sample, and whether the surface lies between: then the gate before it."""
+    s = node.state
+    change = (s[2] > 0.0) != (z > 0.0)
+    gate = AIR_GATE if s[2] > 0.0 else -WATER_GATE
+    if change and objective.paper > 0.0:  # where the line to the sample meets the gate
+        share = (s[2] - gate) / (s[2] - z)
+        return s[0] + share * (x - s[0]), s[1] + share * (y - s[1]), gate, change
+    return x, y, gate if change else z, change
+
+
+@inlined
+def is_there(node, x, y, z, change):
+    """Whether a node has come to the point it was sent to: near enough to cross there, or to end there."""
+    s = node.state
     air = s[2] > 0.0
-    if air == (z > 0.0):
-        return clearance_between(work, s, (x, y, z), 0, radius) >= margin
-    gate = AIR_GATE if air else -WATER_GATE
-    return clearance_between(work, s, (x, y, gate), 0, radius) >= margin and column_is_free(work, x, y, radius, margin)
+    dx, dy, dz = x - s[0], y - s[1], z - s[2]
+    across2 = dx * dx + dy * dy
+    if change:
+        speed = np.sqrt(s[6] * s[6] + s[7] * s[7])
+        near = (0.3 + STOP_TIME * speed) if air else _WATER_REACHED
+        return across2 < near * near and abs(dz) < 0.7
+    near = _AIR_REACHED if air else _WATER_REACHED
+    return across2 + dz * dz < near * near
 
 
 @routine
@@ -44,33 +71,19 @@ def extend(work, values, goal, source, size, x, y, z, limit, step, objective, ma
         if size >= work.path.size - 1:
             break
         node = work.nodes[current]
-        air = node.state[2] > 0.0
-        change = air != (z > 0.0)
-        aim_z = (AIR_GATE if air else -WATER_GATE) if change else z
-        aim_x, aim_y = x, y
-        if change and objective.paper > 0.0:
-            share = (node.state[2] - aim_z) / (node.state[2] - z)
-            aim_x = node.state[0] + share * (x - node.state[0])
-            aim_y = node.state[1] + share * (y - node.state[1])
-        dx, dy, dz = aim_x - node.state[0], aim_y - node.state[1], aim_z - node.state[2]
-        across2 = dx * dx + dy * dy
-        if change:
-            speed = np.sqrt(node.state[6] * node.state[6] + node.state[7] * node.state[7])
-            near = (0.3 + 0.45 * speed) if air else _WATER_REACHED
-            if across2 < near * near and abs(dz) < 0.7:
+        aim_x, aim_y, aim_z, change = aim_at(node, x, y, z, objective)
+        if is_there(node, aim_x, aim_y, aim_z, change):
+            grown = size
+            if change:
                 grown = cross(work, values, goal, current, size, x, y, objective, margin, ticks)
-                if grown == size:
-                    break
-                size = grown
-                current = size - 1
-                if work.nodes[current].goal:
-                    break
-                continue
-        else:
-            near = _AIR_REACHED if air else _WATER_REACHED
-            if across2 + dz * dz < near * near:
+            if grown == size:
                 break
-        if air:
+            size = grown
+            current = size - 1
+            if work.nodes[current].goal:
+                break
+            continue
+        if node.state[2] > 0.0:
             psi = facing(aim_x, aim_y, goal[0], goal[1], node.reference[3]) if goal[2] < 0.0 else node.reference[3]
             rx, ry, rz, psi = air_reference(node, aim_x, aim_y, aim_z, psi, model, step, period)
         else:

@@ -1,0 +1,22 @@
+"""How near straight lines come to what is known."""
+
+import numpy as np
+
+from hydrone_gym._jit import inlined
+from hydrone_gym.world.obstacles import swept_distance
+
+
+@inlined
+def clearance_between(a, b, spheres, first, count, radius):
+    """Least clearance (m) of a vehicle on the straight path between two points (m), infinite without spheres.
+
+    `spheres` are flat, x, y, z, r in m; those numbered from `first` up to `count` are looked at.
+    """
+    least = np.inf
+    for j in range(first, count):
+        k = 4 * j
+        distance = swept_distance(
+            a[0], a[1], a[2], b[0], b[1], b[2], spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3]
+        )
+        least = min(least, distance - radius)
+    return least
