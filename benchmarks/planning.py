@@ -9,8 +9,6 @@ not end at the goal are saved as scenario files beside the results, named after 
 
 import dataclasses
 import json
-import subprocess
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -19,9 +17,11 @@ import gymnasium as gym
 import numpy as np
 import tyro
 from joblib import Parallel, delayed
-from scipy.stats import binomtest
 
-from hydrone_gym import Outcome, save_scenario
+from hydrone_gym import save_scenario
+from hydrone_gym.evaluation import Record, fly, percentiles, wilson_interval
+from hydrone_gym.evaluation.provenance import commit, machine
+from hydrone_gym.evaluation.records import record_of
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw, generate
 from hydrone_gym.world.world import World
@@ -63,20 +63,11 @@ class Arguments:
 
 
 class Flown(NamedTuple):
-    """One flight."""
+    """One flight: its record as in an evaluation, the share of time under water, and each cycle's time in ms."""
 
-    seed: int
-    outcome: str
-    time: float
-    energy: float
-    length: float
-    clearance: float
-    lateral: float
-    tilt: float
-    crossing: float
+    record: Record
     in_water: float
-    cycles: tuple[float, ...]  # s
-    edges: int
+    cycles: np.ndarray
 
 
 def law_of(name: str, density: int) -> ScenarioLaw:
@@ -84,80 +75,58 @@ def law_of(name: str, density: int) -> ScenarioLaw:
     return dataclasses.replace(SETS[name], num_obstacles=density, obstacle_radius=DENSITIES[density])
 
 
-def fly_some(name: str, density: int, seeds: range, a: Arguments) -> list[Flown]:
-    """Fly the worlds of some seeds."""
+def fly_some(name: str, density: int, seeds: list[int], a: Arguments) -> list[Flown]:
+    """Fly the worlds of some seeds; save those that do not end at the goal."""
     vehicle = named_vehicle(a.vehicle)
     env = gym.make("HydroneGym/Mission-v0", num_obstacles=density, vehicle=a.vehicle, disable_env_checker=True)
-    planner = CLRRT.for_env(env, iterations=a.iterations, objective=a.objective, latency=a.latency)
+    planner: Any = CLRRT.for_env(env, iterations=a.iterations, objective=a.objective, latency=a.latency)
     law, flown = law_of(name, density), []
     observation, _ = env.reset(seed=0)
     planner.predict(observation)  # compiled, or loaded from the cache, before anything is timed
     for seed in seeds:
         scenario = generate(law, World(), vehicle.radius, np.random.default_rng(seed))
-        observation, _ = env.reset(options={"scenario": scenario})
-        state, done, length, wet, cycles, edges = None, False, 0.0, 0, [], 0
-        while not done:
-            before = observation["state"][:3]
-            began = time.perf_counter()
-            action, state = planner.predict(observation, state)
-            cycles.append(time.perf_counter() - began)
-            edges += state[0].report.edges
-            observation, _, terminated, truncated, info = env.step(action)
-            length += float(np.linalg.norm(observation["state"][:3] - before))
-            wet += observation["state"][2] < 0.0
-            done = terminated or truncated
-        crossings = info["transitions"]
-        flown.append(
-            Flown(
-                seed,
-                info["outcome"].name,
-                info["time"],
-                info["energy"],
-                length,
-                info["clearance"],
-                max((c["lateral_speed"] for c in crossings), default=0.0),
-                float(np.degrees(max((c["tilt"] for c in crossings), default=0.0))),
-                crossings[0]["time"] if crossings else float("nan"),
-                wet * 0.5 / info["time"],
-                tuple(cycles),
-                edges,
-            )
-        )
-        if info["outcome"] is not Outcome.GOAL:
+        flight = fly(env, planner, scenario=scenario)
+        record = record_of((name, f"{density} spheres", seed, "clrrt"), flight)
+        flown.append(Flown(record, float((flight.trace.states[:, 2] < 0.0).mean()), flight.decision_ms))
+        if not record.success:
             folder = a.out.parent / "failed"
             folder.mkdir(parents=True, exist_ok=True)
-            stem = f"{a.vehicle}-{a.objective}-{name}-{density}-{seed}-{info['outcome'].name.lower()}"
+            stem = f"{a.vehicle}-{a.objective}-{name}-{density}-{seed}-{record.outcome.lower()}"
             save_scenario(scenario, folder / f"{stem}.json")
     return flown
 
 
 def summary(flown: list[Flown]) -> dict[str, Any]:
-    """Figures of a set."""
-    outcomes = [f.outcome for f in flown]
-    reached = [f for f in flown if f.outcome == "GOAL"]
-    interval = binomtest(len(reached), len(flown)).proportion_ci(method="wilson")
-    cycles = 1e3 * np.concatenate([f.cycles for f in flown])
+    """Figures of a set; medians over the flights that arrived."""
+    records = [f.record for f in flown]
+    reached = [record for record in records if record.success]
+    outcomes = [record.outcome for record in records]
+    low, high = wilson_interval(len(reached), len(records))
+    p50, p99, most = percentiles(np.concatenate([f.cycles for f in flown]), (50.0, 99.0, 100.0))
+
+    def median(name: str) -> float | None:
+        values = [value for record in reached if (value := getattr(record, name)) is not None]
+        return float(np.median(values)) if values else None
+
     return {
-        "worlds": len(flown),
+        "worlds": len(records),
         "goal": len(reached),
-        "success_low": interval.low,
-        "success_high": interval.high,
-        "failures": {f"{f.seed}": f.outcome for f in flown if f.outcome != "GOAL"},
+        "success_low": low,
+        "success_high": high,
+        "failures": {str(record.world): record.outcome for record in records if not record.success},
         "collisions": outcomes.count("COLLISION"),
         "rough": outcomes.count("ROUGH_TRANSITION"),
-        "time_s": float(np.median([f.time for f in reached])),
-        "length_m": float(np.median([f.length for f in reached])),
-        "energy_J": float(np.median([f.energy for f in reached])),
-        "crossing_s": float(np.nanmedian([f.crossing for f in reached])) if reached[0].crossing > 0 else None,
-        "water_share": float(np.mean([f.in_water for f in reached])),
-        "lateral_max": max(f.lateral for f in flown),
-        "tilt_max": max(f.tilt for f in flown),
-        "clearance_min": min(f.clearance for f in flown),
-        "cycle_p50_ms": float(np.percentile(cycles, 50)),
-        "cycle_p99_ms": float(np.percentile(cycles, 99)),
-        "cycle_max_ms": float(cycles.max()),
-        "edges_a_cycle": sum(f.edges for f in flown) / len(cycles),
-        "edges_a_second": sum(f.edges for f in flown) / (cycles.sum() / 1e3),
+        "time_s": median("time"),
+        "length_m": median("length"),
+        "energy_J": median("energy"),
+        "crossing_s": median("crossing_time"),
+        "water_share": float(np.mean([f.in_water for f in flown if f.record.success])),
+        "lateral_max": max(record.lateral_speed or 0.0 for record in records),
+        "tilt_max": float(np.degrees(max(record.tilt or 0.0 for record in records))),
+        "clearance_min": min((r.clearance for r in records if r.clearance is not None), default=None),
+        "cycle_p50_ms": p50,
+        "cycle_p99_ms": p99,
+        "cycle_max_ms": most,
     }
 
 
@@ -189,9 +158,8 @@ def main(a: Arguments) -> None:
             results[f"{name}, {density} spheres"] = summary(flown)
             print(table(dict([list(results.items())[-1]])).splitlines()[-1], flush=True)
     a.out.parent.mkdir(parents=True, exist_ok=True)
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
     arguments = {key: str(value) for key, value in dataclasses.asdict(a).items()}
-    document = {"arguments": arguments, "commit": commit.stdout.strip(), "results": results}
+    document = {"arguments": arguments, "commit": commit(), "machine": machine(), "results": results}
     a.out.write_text(json.dumps(document, indent=1, default=float) + "\n")
     print("\n" + table(results))
 
