@@ -17,7 +17,8 @@ import tyro
 from numpy.typing import NDArray
 
 import hydrone_gym  # noqa: F401  (registers the ids)
-from agents.agent import load_agent
+from agents.agent import load_agent, shipped_agents
+from hydrone_gym.evaluation.policies import find_policy, known_policies
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
@@ -110,12 +111,14 @@ def evaluate_missions(
 ) -> list[Score]:
     """Fly an agent, behind the shield or alone, in held-out worlds of every mission; arguments as in `evaluate`.
 
-    Raises what `load_agent` and `evaluate` raise.
+    `agent` may also be a registered policy that flies batches, such as "straight-line". Raises what `load_agent` and
+    `evaluate` raise.
     """
     scores = []
     for mission in MISSIONS:
         env = gym.make(mission, **(options or {}))
-        loaded = load_agent(agent, env)
+        registered = agent in known_policies() and agent not in shipped_agents()
+        loaded = find_policy(str(agent)).make(env, 0) if registered else load_agent(agent, env)
         policy = Shield.for_env(loaded, env) if shield else loaded
         scores.append(evaluate(policy, mission, episodes=episodes, options=options))
     return scores
@@ -151,7 +154,7 @@ class Evaluation:
     """Fly an agent once in each of many held-out worlds, deterministically, and print how the flights ended."""
 
     agent: str
-    """Name of a shipped agent, or a folder."""
+    """Name of a shipped agent, or a folder; for comparison also a registered policy such as straight-line."""
     shield: bool = False
     """Fly behind the shield."""
     episodes: int = 4000

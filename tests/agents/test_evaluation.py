@@ -9,6 +9,7 @@ import pytest
 from agents import load_agent
 from agents.agent import PRETRAINED
 from agents.evaluation import MISSIONS, evaluate, main
+from planners import StraightLine
 from planners.shield import Shield
 
 
@@ -35,6 +36,13 @@ def test_worlds_and_the_shield(capsys):
         env = gym.make(mission, **options)
         alone = evaluate(Shield.for_env(load_agent("ppo", env), env), mission, episodes=6, options=options)
         assert (score["time"], score["energy"]) == (alone.time, alone.energy)
+
+
+def test_a_policy_that_has_learnt_nothing(capsys):
+    env = gym.make(MISSIONS[2])
+    alone = evaluate(Shield.for_env(StraightLine.for_env(env), env), MISSIONS[2], episodes=6)
+    score = scores(capsys, "--agent", "straight-line", "--shield")[2]
+    assert (score["time"], score["energy"]) == (alone.time, alone.energy)
 
 
 def test_the_table(capsys):
