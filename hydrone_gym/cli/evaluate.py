@@ -61,23 +61,23 @@ class Evaluate:
         """Fly, report and return the exit code."""
         try:
             plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
-            baseline = self._baseline([policy.label for policy in plan.policies])
+            self._check_baseline([policy.label for policy in plan.policies])
             folder = RunFolder(self._folder(plan), plan.arguments(), overwrite=self.overwrite)
             if self.report is not None:
                 self.report.mkdir(parents=True, exist_ok=True)
         except (ValueError, OSError) as error:
             print(f"hydrone: error: {error}", file=sys.stderr)
             return 2
-        return self._fly(plan, folder, baseline)
+        return self._fly(plan, folder)
 
-    def _fly(self, plan: Plan, folder: RunFolder, baseline: str) -> int:
+    def _fly(self, plan: Plan, folder: RunFolder) -> int:
         """Carry the plan out, write and show what came of it, and return the exit code."""
         began = time.perf_counter()
         announce_compiling(*kernels_of(*plan.policies))
         try:
             records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
             seconds = time.perf_counter() - began
-            document, tables = write_results(plan, records, folder.folder, baseline=baseline, seconds=seconds)
+            document, tables = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
             pages = [] if self.report is None else [self._report(plan, folder.folder, self.report)]
         except (EvaluationStopped, OSError) as error:
             print(f"hydrone: error: {error}", file=sys.stderr)
@@ -107,13 +107,10 @@ class Evaluate:
                 print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
         return write_report(folder, into=target, plan=plan, replay=writer)
 
-    def _baseline(self, labels: list[str]) -> str:
-        """Return the baseline; ValueError for one that does not fly."""
-        if self.baseline is None:
-            return "clrrt" if "clrrt" in labels else labels[0]
-        if self.baseline not in labels:
+    def _check_baseline(self, labels: list[str]) -> None:
+        """Raise ValueError for a baseline that does not fly."""
+        if self.baseline is not None and self.baseline not in labels:
             raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")
-        return self.baseline
 
     def _folder(self, plan: Plan) -> Path:
         names = "+".join(suite.name for suite in plan.suites)

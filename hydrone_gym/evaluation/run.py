@@ -3,6 +3,7 @@
 import contextlib
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from hydrone_gym.evaluation.jobs import Failure, fly_job
 from hydrone_gym.evaluation.plan import Plan, PoliciesLike, SuiteLike, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
 from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.results import write_results
 from hydrone_gym.evaluation.run_folder import RunFolder
 
 
@@ -52,7 +54,8 @@ def evaluate(
         jobs: flights at once.
         backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
             this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
-        out: folder to write rows to as they are finished; an evaluation with the same arguments that was stopped there
+        out: folder to write rows to as they are finished, and `summary.json` and `tables.md` at the end, ready for
+            `hydrone_gym.evaluation.page.write_report`; an evaluation with the same arguments that was stopped there
             goes on where it was.
         overwrite: begin anew in that folder whatever it holds.
         progress: show a bar with the time left on stderr.
@@ -64,7 +67,11 @@ def evaluate(
     """
     plan = make_plan(suites, policies, worlds=worlds, seed=seed, vehicle=vehicle)
     folder = None if out is None else RunFolder(Path(out), plan.arguments(), overwrite=overwrite)
-    return carry_out(plan, folder, jobs=jobs, backend=backend, progress=progress)
+    began = time.perf_counter()
+    records = carry_out(plan, folder, jobs=jobs, backend=backend, progress=progress)
+    if folder is not None:
+        write_results(plan, records, folder.folder, seconds=time.perf_counter() - began)
+    return records
 
 
 def carry_out(

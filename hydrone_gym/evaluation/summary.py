@@ -10,6 +10,7 @@ from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, pair
 from hydrone_gym.simulation.outcome import Outcome
 
 ALL_MISSIONS = "all missions"
+BASELINE = "clrrt"  # policy that the others are compared with unless another is named
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +101,7 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
 
     Args:
         records: in any order.
-        baseline: policy to compare with; the first one of the records unless given.
+        baseline: policy to compare with; unless given `BASELINE` if it flew, else the first one of the records.
 
     Returns:
         For each suite its missions in the order of the records, then all of them together if they are several.
@@ -111,6 +112,7 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
     policies = list(dict.fromkeys(record.policy for record in records))
     if baseline is not None and baseline not in policies:
         raise ValueError(f"baseline must be one of {', '.join(policies)}, got {baseline!r}")
+    baseline = baseline or (BASELINE if BASELINE in policies else policies[0])
     summaries = []
     for suite in dict.fromkeys(record.suite for record in records):
         within = [record for record in records if record.suite == suite]
@@ -118,7 +120,7 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
         groups = [(name, [record for record in within if record.mission == name]) for name in missions]
         if len(missions) > 1:
             groups.append((ALL_MISSIONS, within))
-        summaries += [_mission(suite, name, group, baseline or policies[0]) for name, group in groups]
+        summaries += [_mission(suite, name, group, baseline) for name, group in groups]
     return summaries
 
 

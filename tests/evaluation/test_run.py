@@ -1,5 +1,6 @@
 """Evaluations give the same rows however they are run."""
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,6 +13,7 @@ import pytest
 import agents.evaluation
 from agents import load_agent
 from hydrone_gym.evaluation import Suite, evaluate, fly, load_suite
+from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import WORLDS_A_JOB, make_plan
 from hydrone_gym.evaluation.records import TIMING
 from planners import CLRRT, StraightLine
@@ -33,6 +35,18 @@ def test_rows_come_in_the_order_of_the_plan(serial):
     assert [record.key for record in serial] == make_plan("paper-20", **FEW).keys()
     assert len(serial) == 4 * 2 * FEW["worlds"]
     assert len({record.key for record in serial}) == len(serial)
+
+
+def test_a_folder_holds_all_that_a_report_is_made_of(tmp_path):
+    policies = {"line": "straight-line", "clrrt": "clrrt"}
+    records = evaluate("paper-20", policies, worlds=2, out=tmp_path)
+    document = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert document["complete"] is True
+    assert document["rows"] == len(records) == 8
+    assert document["arguments"]["baseline"] == "clrrt"
+    assert (tmp_path / "tables.md").is_file()
+    page = write_report(tmp_path, into=tmp_path / "report")
+    assert "line" in page.read_text(encoding="utf-8")
 
 
 def test_a_row_is_the_flight_by_hand(serial):
