@@ -1,6 +1,6 @@
 """Recipes: hyper-parameters as documented data, one YAML file an algorithm in the format of rl-baselines3-zoo."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ class Recipe:
         policy: name of the policy class of Stable-Baselines3.
         settings: the other arguments of the algorithm, as written in the file.
         shield: whether the rows fly behind the shield.
+        environment: keyword options of the environments that the rows fly in, where the defaults are not meant.
     """
 
     algorithm: str
@@ -35,6 +36,7 @@ class Recipe:
     policy: str
     settings: dict[str, Any]
     shield: bool = False
+    environment: dict[str, Any] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -77,9 +79,17 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     missions = content.get("missions", {ENV_ID: count})
     if not isinstance(missions, dict) or sum(missions.values()) != count:
         raise ValueError(f"{file}: the rows of missions must sum to n_envs = {count}, got {missions!r}")
-    shield = bool(content.get("shield", False))
+    environment = content.get("environment", {})
+    if not isinstance(environment, dict):
+        raise ValueError(f"{file}: environment must be a mapping of keyword options, got {environment!r}")
     return Recipe(
-        algorithm=algorithm, steps=int(steps), missions=missions, policy=policy, settings=settings, shield=shield
+        algorithm=algorithm,
+        steps=int(steps),
+        missions=missions,
+        policy=policy,
+        settings=settings,
+        shield=bool(content.get("shield", False)),
+        environment=environment,
     )
 
 

@@ -28,10 +28,10 @@ class Train:
     """Run folder whose latest weights to begin with."""
     resume: Path | None = None
     """Go on with the run in this folder from its latest checkpoint; excludes every option above."""
-    obstacles: int = 20
-    """Number of spheres."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
+    obstacles: int | None = None
+    """Number of spheres in training and evaluation; unless given the recipe's, and 20 in evaluation."""
+    vehicle: Literal["paper", "physical"] | None = None
+    """Parameter set of the vehicle, "paper" unless given."""
     num_threads: int = 1
     """Threads of torch; with one, a seed gives the same weights again."""
     checkpoint_every: int = 500_000
@@ -81,13 +81,14 @@ class Train:
                 raise ValueError(f"--resume excludes {', '.join(given)}: the run folder says what is trained")
         if self.resume is None and self.algorithm == "ppo_shielded" and self.start_from is None:
             raise ValueError("ppo_shielded goes on with weights trained without the shield: name their --start-from")
+        options = {"num_obstacles": self.obstacles, "vehicle": self.vehicle}
         return {
             "algorithm": self.algorithm,
             "seed": self.seed,
             "steps": self.steps,
             "recipe": self.recipe,
             "start_from": self.start_from,
-            "options": {"num_obstacles": self.obstacles, "vehicle": self.vehicle},
+            "options": {name: value for name, value in options.items() if value is not None},
             "threads": self.num_threads,
             "checkpoint_every": self.checkpoint_every,
             "evaluation_episodes": self.evaluation_episodes,

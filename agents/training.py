@@ -40,7 +40,8 @@ class TrainingRun:
         seed: of everything random; one seed and one thread give the same weights again.
         steps: transitions, the recipe's number unless given.
         recipe: path of a YAML file to use instead of the package's.
-        options: keyword options of the environments, `num_obstacles` and so on.
+        options: keyword options of the environments, `num_obstacles` and so on, in training and evaluation; they go
+            before those of the recipe, which are for training alone.
         start_from: run folder whose latest weights to begin with, None for new ones.
         threads: of torch; with one, results repeat bit for bit.
         checkpoint_every: least number of steps between checkpoints.
@@ -94,7 +95,7 @@ def train(run: TrainingRun) -> list[Score]:
     if (run.folder / CONFIG).exists():
         raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
     torch.set_num_threads(run.threads)
-    rows = MissionMix(recipe.missions, run.options, shield=recipe.shield)
+    rows = MissionMix(recipe.missions, {**recipe.environment, **run.options}, shield=recipe.shield)
     algorithm = ALGORITHMS[run.algorithm]
     model = algorithm.model(recipe.policy, rows, **_arguments(recipe, algorithm), seed=run.seed, device="cpu")
     if run.start_from is not None:

@@ -183,6 +183,22 @@ def test_start_from_takes_the_weights(tmp_path, recipe, monkeypatch):
     np.testing.assert_array_equal(first, layers(tmp_path / "first")[0])
 
 
+def test_the_recipe_says_what_the_rows_fly_in(tmp_path, monkeypatch):
+    """In training, unless the run says something else; evaluation flies what the run says."""
+    flown = []
+    monkeypatch.setattr(training, "evaluate_missions", lambda agent, **told: flown.append(told["options"]) or [])
+    made = []
+    monkeypatch.setattr(
+        training, "MissionMix", lambda *args, **more: made.append(MissionMix(*args, **more)) or made[-1]
+    )
+    recipe = written(tmp_path / "dense.yml", {**SMALL, "environment": {"num_obstacles": 7, "time_limit": 30.0}})
+    for name, options in (("a", {}), ("b", {"num_obstacles": 9})):
+        train(small_run(tmp_path / name, recipe, steps=PERIOD, options=options, evaluation_episodes=2))
+    rows = [part.env.options for mix in made for part in mix.parts]
+    assert [(o.num_obstacles, o.time_limit) for o in rows] == [(7, 30.0)] * 2 + [(9, 30.0)] * 2
+    assert flown == [{}, {"num_obstacles": 9}]
+
+
 def test_bad_runs(tmp_path, recipe):
     with pytest.raises(FileNotFoundError, match="no training run"):
         resume(tmp_path / "nothing")
@@ -205,6 +221,7 @@ def test_bad_runs(tmp_path, recipe):
         ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P, policy_kwargs: dict()}", "code is not run"),
         ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P, noise_type: ou}", "must be 'normal', got 'ou'"),
         ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P}\nmissions: {a: 3}", "must sum to n_envs = 4"),
+        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P}\nenvironment: [7]", r"mapping .* got \[7\]"),
     ],
 )
 def test_bad_recipes(tmp_path, text, message):
