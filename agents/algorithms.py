@@ -9,8 +9,6 @@ from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.activation import Tanh
-
 
 @dataclass(frozen=True, kw_only=True)
 class Algorithm:
@@ -18,14 +16,12 @@ class Algorithm:
 
     Attributes:
         model: the class.
-        activation: between the layers of its networks, unless a recipe says otherwise.
         mean: from its policy to the modules, in order, whose output is the mean action before squashing.
         output: what squashes it: "tanh", or "linear" for nothing.
         log_interval: updates, or for off-policy algorithms episodes, between two points in TensorBoard.
     """
 
     model: type[BaseAlgorithm]
-    activation: type[torch.nn.Module]
     mean: Callable[[Any], Sequence[torch.nn.Module]]
     output: str
     log_interval: int
@@ -43,10 +39,10 @@ def _td3_mean(policy: Any) -> Sequence[torch.nn.Module]:
     return [*policy.actor.mu][:-1]  # the last module is its tanh
 
 
-_PPO = Algorithm(model=PPO, activation=Tanh, mean=_ppo_mean, output="linear", log_interval=1)
-_SAC = Algorithm(model=SAC, activation=torch.nn.ReLU, mean=_gaussian_mean, output="tanh", log_interval=1000)
-_TD3 = Algorithm(model=TD3, activation=torch.nn.ReLU, mean=_td3_mean, output="tanh", log_interval=1000)
-_TQC = Algorithm(model=TQC, activation=torch.nn.ReLU, mean=_gaussian_mean, output="tanh", log_interval=1000)
+_PPO = Algorithm(model=PPO, mean=_ppo_mean, output="linear", log_interval=1)
+_SAC = Algorithm(model=SAC, mean=_gaussian_mean, output="tanh", log_interval=1000)
+_TD3 = Algorithm(model=TD3, mean=_td3_mean, output="tanh", log_interval=1000)
+_TQC = Algorithm(model=TQC, mean=_gaussian_mean, output="tanh", log_interval=1000)
 
 # by the name of the recipe, agents/hyperparameters/<name>.yml
 ALGORITHMS = {"ppo": _PPO, "ppo_shielded": _PPO, "sac": _SAC, "td3": _TD3, "tqc": _TQC}

@@ -16,7 +16,7 @@ import yaml
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.agent_file import save_agent
-from agents.algorithms import ALGORITHMS, Algorithm
+from agents.algorithms import ALGORITHMS
 from agents.checkpoint import MODEL, checkpoints, load_checkpoint
 from agents.evaluation import HELD_OUT, Score, evaluate_missions
 from agents.export import export_agent
@@ -96,8 +96,7 @@ def train(run: TrainingRun) -> list[Score]:
         raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
     torch.set_num_threads(run.threads)
     rows = MissionMix(recipe.missions, {**recipe.environment, **run.options}, shield=recipe.shield)
-    algorithm = ALGORITHMS[run.algorithm]
-    model = algorithm.model(recipe.policy, rows, **_arguments(recipe, algorithm), seed=run.seed, device="cpu")
+    model = ALGORITHMS[run.algorithm].model(recipe.policy, rows, **_arguments(recipe), seed=run.seed, device="cpu")
     if run.start_from is not None:
         model.set_parameters(_latest(run.start_from) / MODEL, device="cpu")
     run.folder.mkdir(parents=True, exist_ok=True)
@@ -122,10 +121,10 @@ def resume(folder: Path, *, progress: bool = True) -> list[Score]:
     return _learn(run, recipe, model, extra["spent"])
 
 
-def _arguments(recipe: Recipe, algorithm: Algorithm) -> dict[str, Any]:
-    """Complete the recipe's settings: the activation where it says nothing else, and a longer memory of successes."""
+def _arguments(recipe: Recipe) -> dict[str, Any]:
+    """Complete the recipe's settings: rectifiers between layers, cheaper than PPO's tanh; more episodes remembered."""
     arguments = recipe.arguments()
-    policy = {"activation_fn": algorithm.activation, **arguments.get("policy_kwargs", {})}
+    policy = {"activation_fn": torch.nn.ReLU, **arguments.get("policy_kwargs", {})}
     return {"stats_window_size": 1000, **arguments, "policy_kwargs": policy}
 
 

@@ -7,6 +7,10 @@ can, the vehicle goes on to the hover verified last. So a verified way to rest i
 that flies as the model says meets only what cannot be known. The same invariant keeps the CL-RRT safe; the shield has
 no tree, and leaves finding the way to the policy.
 
+Rest under water does not last: only weak drag brakes sway, and over a minute a few millimetres a second carry a
+hovering vehicle through a wall. So under water the hover verified last is verified again, and when it is no longer safe
+the vehicle retreats: it turns and swims a metre against its drift. A verified retreat is held like a hover.
+
 A policy without memory may ask for ever for what is refused, under a sphere that hangs just above the surface say. So
 a vehicle that was refused something in `PATIENCE` periods at one place is sent aside for `ASIDE` periods, each time in
 another direction, checked like any other reference; from there the policy tries again.
@@ -23,9 +27,9 @@ from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE
 from planners.policy import KEYS, simulation_of
-from planners.stop_check import HELD, guard
+from planners.stop_check import HELD, RETREAT, guard
 
-__all__ = ["CANDIDATES", "HELD", "Shield", "ShieldState"]
+__all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
 
 PATIENCE = 7  # refusals within `_PLACE` of one place after which the vehicle is sent aside
 ASIDE = 14  # periods that a step aside lasts: down out of the zone and then some
@@ -52,8 +56,8 @@ class ShieldState(NamedTuple):
     """What travels between calls; one entry an environment, also for a single one."""
 
     policy: Any  # memory of the policy inside
-    held: NDArray[np.float64]  # (n, 4) hovers verified last: m, m, m, rad
-    choice: NDArray[np.int64]  # (n,) of the last period: 0 as proposed, k candidate k, HELD
+    held: NDArray[np.float64]  # (n, 4) hovers or retreats verified last: m, m, m, rad
+    choice: NDArray[np.int64]  # (n,) of the last period: 0 as proposed, k candidate k, HELD or RETREAT
     interventions: NDArray[np.int64]  # (n,) periods of this episode in which another reference was flown
     periods: NDArray[np.int64]  # (n,) of this episode
     place: NDArray[np.float64]  # (n, 3) where the vehicle was when it last got away from a place, m

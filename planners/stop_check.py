@@ -12,10 +12,15 @@ from hydrone_gym.world.obstacles import swept_distance
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, hover_reference, inside
 from planners.clearance import clearance_between
 
-HELD = -1  # choice: no candidate was safe, the hover verified last goes on
+HELD = -1  # choice: no candidate was safe, what was verified last goes on
+RETREAT = -2  # choice: nor was that any more, the vehicle turns under water and swims against its drift
 MARGIN = 0.05  # m of clearance that checked motion keeps
 LOOK_AHEAD = 12  # periods that a hover is simulated for
+RETREAT_AHEAD = 20  # periods that a retreat is simulated for: a quarter turn takes ten
+_RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
+_TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
+_LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
 _NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
 _DRIFT = 12.0  # s: what is left of sway at the end of a stop in water goes on for a while
 _GIVE = 0.002  # m: how much nearer than now a vehicle within the margin may come; more would add up
@@ -83,19 +88,28 @@ def _copy(source, destination):
         destination.goal[c] = source.goal[c]
 
 
+@inlined
+def _resting(s, hover, model):
+    """Whether a state that a hover reference has been flown to for a period stays: slow, level, not about to drive."""
+    dx, dy, hold = hover[0] - s[0], hover[1] - s[1], model.water_gains.hold_radius
+    slow = s[6] * s[6] + s[7] * s[7] + s[8] * s[8] < _REST * _REST
+    level = s[3] * s[3] + s[4] * s[4] + s[9] * s[9] + s[10] * s[10] < _LEVEL * _LEVEL
+    return slow and level and abs(s[2]) > model.world.zone and (s[2] > 0.0 or dx * dx + dy * dy < hold * hold)
+
+
 @routine
-def _rests(row, eye, hover, spheres, closest, count, margin, ticks, model, block, log):
-    """Whether a row comes to rest safely at a hover reference (4,); the row is changed in place."""
+def _rests(row, eye, hover, periods, spheres, closest, count, margin, ticks, model, block, log):
+    """Whether a row comes to rest safely at a hover reference (4,) within periods; the row is changed in place."""
     s = row.state
-    for _ in range(LOOK_AHEAD):
-        if abs(s[2]) > model.world.zone and s[6] * s[6] + s[7] * s[7] + s[8] * s[8] < _REST * _REST:
-            break
+    for _ in range(periods):
         hx, hy, hz, heading = hover[0], hover[1], hover[2], hover[3]
         safe, arrives = _follow(
             row, eye, hx, hy, hz, heading, spheres, closest, count, margin, ticks, model, block, log
         )
         if arrives or not safe:
             return safe
+        if _resting(s, hover, model):
+            break
     if s[2] < 0.0:
         x, y = s[0] + _DRIFT * s[6], s[1] + _DRIFT * s[7]
         w = model.world
@@ -119,12 +133,40 @@ def _verify(row, scratch, rx, ry, rz, psi, hover, spheres, closest, count, margi
     if arrives or not safe:
         return safe
     _copy(end, spare)
-    if _rests(spare, eye, hover, spheres, closest, count, margin, ticks, model, block, log):
+    if _rests(spare, eye, hover, LOOK_AHEAD, spheres, closest, count, margin, ticks, model, block, log):
         return True
     if abs(end.state[2]) > AIR_GATE:
         return False
     hover[2] = _single(AIR_GATE if hz < 0.0 else -WATER_GATE)
-    return _rests(end, eye, hover, spheres, closest, count, margin, ticks, model, block, log)
+    return _rests(end, eye, hover, LOOK_AHEAD, spheres, closest, count, margin, ticks, model, block, log)
+
+
+@routine
+def _goes_on(row, scratch, held, spheres, closest, count, margin, ticks, model, block, log):
+    """Return HELD or RETREAT where no candidate verifies; a retreat is written to `held` (4,).
+
+    Under water a hover drifts, so what was safe when it was verified may no longer be; then the vehicle swims against
+    the drift, as nearly as is free. While it turns it may come nearer to spheres than the margin.
+    """
+    s, end = row.state, scratch[0]
+    if s[2] > 0.0:
+        return HELD
+    _copy(row, end)
+    if _rests(end, s, held, RETREAT_AHEAD, spheres, closest, count, margin, ticks, model, block, log):
+        return HELD
+    w, back = model.world, np.empty(4)
+    back[2], back[3] = _single(inside(min(s[2], -WATER_GATE), w.z_min, w.z_max)), _single(s[5])
+    scale = -_RETREAT / max(np.sqrt(s[6] * s[6] + s[7] * s[7]), 1e-9)
+    for turn in _TURNS:
+        sine, cosine = sincos(turn)
+        back[0] = _single(inside(s[0] + scale * (cosine * s[6] - sine * s[7]), w.x_min, w.x_max))
+        back[1] = _single(inside(s[1] + scale * (sine * s[6] + cosine * s[7]), w.y_min, w.y_max))
+        _copy(row, end)
+        if _rests(end, s, back, RETREAT_AHEAD, spheres, closest, count, _LEAST, ticks, model, block, log):
+            for c in range(4):
+                held[c] = back[c]
+            return RETREAT
+    return HELD
 
 
 @kernel
@@ -142,7 +184,7 @@ def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, 
         closest: (M,) working storage; block, log: that of one lane.
         sent: (n, 4) references to fly, written.
         held: (n, 4) hovers verified last, updated.
-        choice: (n,) 0: as proposed, k: candidate k, HELD; written.
+        choice: (n,) 0: as proposed, k: candidate k, HELD or RETREAT; written.
     """
     model = unpack_model(values)
     w = model.world
@@ -170,5 +212,6 @@ def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, 
                     held[n, c] = hover[c]
                 break
         if choice[n] == HELD:
+            choice[n] = _goes_on(row, scratch, held[n], near, closest, count, margin, ticks, model, block, log)
             for c in range(4):
                 sent[n, c] = held[n, c]

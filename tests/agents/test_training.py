@@ -234,7 +234,7 @@ def test_bad_recipes(tmp_path, text, message):
 def test_the_packaged_recipes():
     assert sorted(file.stem for file in FOLDER.glob("*.yml")) == sorted(ALGORITHMS)
     schedule = load_recipe("ppo").arguments()["learning_rate"]
-    assert (schedule(1.0), schedule(0.5), schedule(0.0)) == (5e-4, 2.5e-4, 0.0)
+    assert (schedule(1.0), schedule(0.5), schedule(0.0)) == (6e-4, 3e-4, 0.0)
     noise = load_recipe("td3").arguments()["action_noise"]
     assert noise().shape == (3,)
     names = {spec.name for spec in dataclasses.fields(TrainingRun)}
