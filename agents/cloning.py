@@ -18,7 +18,6 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from agents.activation import Tanh
 from agents.agent import ACTIONS
 from agents.agent_file import TEXT, AgentFile, save_agent
 from agents.demonstration_files import find_datasets, load_demonstrations
@@ -236,7 +235,7 @@ def _layers(hidden: tuple[int, ...]) -> torch.nn.Sequential:
     sizes = (OBSERVATION_SIZE, *hidden)
     layers: list[torch.nn.Module] = []
     for inputs, outputs in pairwise(sizes):
-        layers += [torch.nn.Linear(inputs, outputs), Tanh()]
+        layers += [torch.nn.Linear(inputs, outputs), torch.nn.ReLU()]
     return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], ACTIONS))
 
 
@@ -248,7 +247,7 @@ def _arrays(layers: torch.nn.Sequential, name: str) -> Iterator[NDArray[np.float
 
 def _network_of(layers: torch.nn.Sequential) -> Network:
     weights, biases = tuple(_arrays(layers, "weight")), tuple(_arrays(layers, "bias"))
-    return Network(weights=weights, biases=biases, activation="tanh", output="linear")
+    return Network(weights=weights, biases=biases, activation="relu", output="linear")
 
 
 def _agent_of(layers: torch.nn.Sequential, datasets: list[Demonstrations], cloning: Cloning) -> AgentFile:

@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -51,15 +51,23 @@ class Score:
     energy: float | None
 
 
-def evaluate(
+class Ends(NamedTuple):
+    """How the flights of many worlds ended, an entry a world."""
+
+    outcome: NDArray[np.int64]  # (n,) an `Outcome`
+    time: NDArray[np.float64]  # (n,) s
+    energy: NDArray[np.float64]  # (n,) J
+
+
+def fly_worlds(
     policy: Policy,
     mission: str,
     *,
     episodes: int = 1000,
     seed: int = HELD_OUT,
     options: Mapping[str, Any] | None = None,
-) -> Score:
-    """Fly a policy once in each of many worlds, deterministically.
+) -> Ends:
+    """Fly a policy once in each of many worlds, deterministically, all at once.
 
     Args:
         policy: on the raw interface, for batches.
@@ -89,16 +97,33 @@ def evaluate(
         on = np.flatnonzero(outcome[running] == Outcome.RUNNING)
         running, memory, starts = running[on], _rows_of(memory, on), np.zeros(len(on), bool)
     rows.close()
-    arrived = outcome == Outcome.GOAL
-    count = int(arrived.sum())
+    return Ends(outcome, time, energy)
+
+
+def evaluate(
+    policy: Policy,
+    mission: str,
+    *,
+    episodes: int = 1000,
+    seed: int = HELD_OUT,
+    options: Mapping[str, Any] | None = None,
+) -> Score:
+    """Fly a policy once in each of many worlds and summarise; arguments and errors are those of `fly_worlds`."""
+    return score_of(mission, fly_worlds(policy, mission, episodes=episodes, seed=seed, options=options))
+
+
+def score_of(mission: str, ends: Ends) -> Score:
+    """Summarise flights of one mission, an environment id."""
+    arrived = ends.outcome == Outcome.GOAL
+    episodes, count = len(arrived), int(arrived.sum())
     return Score(
         mission=mission,
         episodes=episodes,
-        outcomes={kind.name: int((outcome == kind).sum()) for kind in Outcome if (outcome == kind).any()},
+        outcomes={kind.name: int((ends.outcome == kind).sum()) for kind in Outcome if (ends.outcome == kind).any()},
         success=count / episodes,
         interval=wilson_interval(count, episodes),
-        time=float(time[arrived].mean()) if count else None,
-        energy=float(energy[arrived].mean()) if count else None,
+        time=float(ends.time[arrived].mean()) if count else None,
+        energy=float(ends.energy[arrived].mean()) if count else None,
     )
 
 
@@ -111,17 +136,23 @@ def evaluate_missions(
 ) -> list[Score]:
     """Fly an agent, behind the shield or alone, in held-out worlds of every mission; arguments as in `evaluate`.
 
-    `agent` may also be a registered policy that flies batches, such as "straight-line". Raises what `load_agent` and
-    `evaluate` raise.
+    Raises what `policy_for` and `evaluate` raise.
     """
     scores = []
     for mission in MISSIONS:
-        env = gym.make(mission, **(options or {}))
-        registered = agent in known_policies() and agent not in shipped_agents()
-        loaded = find_policy(str(agent)).make(env, 0) if registered else load_agent(agent, env)
-        policy = Shield.for_env(loaded, env) if shield else loaded
+        policy = policy_for(agent, gym.make(mission, **(options or {})), shield=shield)
         scores.append(evaluate(policy, mission, episodes=episodes, options=options))
     return scores
+
+
+def policy_for(agent: str | os.PathLike[str], env: Any, *, shield: bool) -> Policy:
+    """Return an agent for an environment, behind the shield or alone.
+
+    `agent` may also be a registered policy that flies batches, such as "straight-line". Raises what `load_agent` does.
+    """
+    registered = agent in known_policies() and agent not in shipped_agents()
+    loaded = find_policy(str(agent)).make(env, 0) if registered else load_agent(agent, env)
+    return Shield.for_env(loaded, env) if shield else loaded
 
 
 def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
@@ -150,8 +181,8 @@ def score_table(scores: Sequence[Score]) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluation:
-    """Fly an agent once in each of many held-out worlds, deterministically, and print how the flights ended."""
+class HeldOutWorlds:
+    """What a command flies: an agent, once in each of many held-out worlds of every mission."""
 
     agent: str
     """Name of a shipped agent, or a folder; for comparison also a registered policy such as straight-line."""
@@ -165,25 +196,44 @@ class Evaluation:
     """Least and greatest radius of a sphere, m."""
     vehicle: Literal["paper", "physical"] = "paper"
     """Parameter set of the vehicle."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Keyword options of the environment."""
+        return {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
+
+    def text(self) -> str:
+        """Do what the command is for and return what is printed."""
+        raise NotImplementedError(f"{type(self).__name__} must define text()")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation(HeldOutWorlds):
+    """Fly an agent once in each of many held-out worlds, deterministically, and print how the flights ended."""
+
     json: bool = False
     """Print JSON instead of the Markdown table."""
 
     def text(self) -> str:
         """Fly and return what is printed; raises as `evaluate_missions` does."""
-        options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
-        scores = evaluate_missions(self.agent, shield=self.shield, episodes=self.episodes, options=options)
+        scores = evaluate_missions(self.agent, shield=self.shield, episodes=self.episodes, options=self.options)
         return json.dumps([dataclasses.asdict(score) for score in scores]) if self.json else score_table(scores)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code, 2 for bad input; `arguments` default to those of the process."""
-    command = tyro.cli(Evaluation, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
+def run_command(kind: type[HeldOutWorlds], name: str, arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code, 2 for bad input; `arguments` default to those of the process."""
+    command = tyro.cli(kind, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
     try:
         print(command.text())
     except (ValueError, TypeError, OSError) as error:
-        print(f"evaluation: error: {error}", file=sys.stderr)
+        print(f"{name}: error: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Evaluate an agent as the arguments say; see `run_command`."""
+    return run_command(Evaluation, "evaluation", arguments)
 
 
 if __name__ == "__main__":

@@ -6,12 +6,11 @@ import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.activation import Tanh
 from agents.agent_file import AgentFile
 from agents.algorithms import algorithm_of
 from agents.network import Network
 
-_ACTIVATIONS: dict[type, str] = {torch.nn.Tanh: "tanh", Tanh: "tanh", torch.nn.ReLU: "relu"}
+_ACTIVATIONS: dict[type, str] = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
 
 
 def export_agent(model: BaseAlgorithm, name: str, environment: str, notes: dict[str, Any] | None = None) -> AgentFile:

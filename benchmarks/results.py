@@ -1,4 +1,4 @@
-"""Write benchmarks/RESULTS.md and docs/images/throughput.png from what the benchmarks last measured.
+"""Write what the benchmarks last measured: benchmarks/RESULTS.md, figures, and tables in two pages of docs/.
 
 python -m benchmarks.results
 """
@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 
-from benchmarks import tables
+from benchmarks import generalisation_table, tables, training_seeds
 from benchmarks.peers import run as peers
 from benchmarks.timing import RESULTS, ROOT
 from hydrone_gym.rendering.style import BLACK, BLUE, DOTS_PER_INCH, FONTS, PURPLE, RED, WATER
@@ -29,6 +29,8 @@ ORDER = (
     "start",
     "rendering",
     "versions",
+    "training_seeds",
+    "generalisation",
 )
 HEAD = """# Measured speed
 
@@ -36,6 +38,8 @@ Written by `python -m benchmarks.results` from `benchmarks/results/*.json`; each
 it again. Rates are per CPU second on one core unless a table says otherwise, medians of turns taken alternately, after
 a warm-up, so that compared figures come from the same minute of the same machine. One environment step is 0.5 s of
 flight: 50 substeps of control and dynamics, collision and sensing every 50 ms against 20 spheres, observation, reward.
+The last four tables are about agents: [how much the seed of a training matters](../docs/training.md), and
+[how policies fare in worlds of another shape](../docs/generalisation.md).
 """
 
 
@@ -45,9 +49,13 @@ def load() -> dict[str, dict[str, Any]]:
     return {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items() if path.exists()}
 
 
-def sheet_of(name: str, measured: dict[str, Any]) -> tables.Sheet:
-    """The table of a measurement."""
-    return peers.sheet(measured) if name == "peers" else tables.BUILDERS[name](measured)
+def sheets_of(name: str, measured: dict[str, Any]) -> list[tables.Sheet]:
+    """The tables of a measurement."""
+    if name == "generalisation":
+        return [generalisation_table.success_sheet(measured), generalisation_table.failure_sheet(measured)]
+    if name == "training_seeds":
+        return training_seeds.sheets(measured)
+    return [peers.sheet(measured) if name == "peers" else tables.BUILDERS[name](measured)]
 
 
 def describe(record: dict[str, Any]) -> str:
@@ -61,12 +69,17 @@ def describe(record: dict[str, Any]) -> str:
     )
 
 
+def origin_of(record: dict[str, Any]) -> str:
+    """Where a measurement comes from, in two lines of Markdown."""
+    return f"`{record['command']}`  \n{describe(record)}\n"
+
+
 def write_page(records: dict[str, dict[str, Any]], path: Path) -> None:
     """One section a measurement."""
     parts = [HEAD, "![Physics substeps a CPU second](../docs/images/throughput.png)\n"]
     for name, record in records.items():
-        parts.append(sheet_of(name, record["measured"]).markdown())
-        parts.append(f"`{record['command']}`  \n{describe(record)}\n")
+        parts += [sheet.markdown() for sheet in sheets_of(name, record["measured"])]
+        parts.append(origin_of(record))
     path.write_text("\n".join(parts), encoding="utf-8")
 
 
@@ -130,6 +143,15 @@ def main() -> int:
     write_page(records, ROOT / "benchmarks" / "RESULTS.md")
     if "peers" in records:
         draw(records, ROOT / "docs" / "images" / "throughput.png")
+    if "generalisation" in records:
+        record = records["generalisation"]
+        generalisation_table.draw(record["measured"], ROOT / "docs" / "images" / "generalisation.png")
+        section = generalisation_table.section(record["measured"], origin_of(record))
+        tables.put_into(ROOT / "docs" / "generalisation.md", section)
+    if "training_seeds" in records:
+        record = records["training_seeds"]
+        parts = [*(sheet.markdown() for sheet in training_seeds.sheets(record["measured"])), origin_of(record)]
+        tables.put_into(ROOT / "docs" / "training.md", "\n".join(parts))
     missing = [name for name in ORDER if name not in records]
     if missing:
         print(f"not measured yet, so left out: {', '.join(missing)}")

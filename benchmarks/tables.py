@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from rich.table import Table
@@ -29,6 +30,18 @@ class Sheet:
         lines = [self.columns, tuple(marks), *self.rows]
         text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
         return f"### {self.title}\n\n{text}\n" + "".join(f"\n{note}\n" for note in self.notes)
+
+
+BEGIN, END = "<!-- measured -->\n", "<!-- end of what was measured -->\n"
+
+
+def put_into(page: Path, section: str) -> None:
+    """Put what was measured (Markdown) between the marks of a page; ValueError if it has none."""
+    before, mark, rest = page.read_text(encoding="utf-8").partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not mark or not end:
+        raise ValueError(f"{page} must hold {BEGIN.strip()} and {END.strip()}")
+    page.write_text(f"{before}{mark}\n{section}\n{end}{after}", encoding="utf-8")
 
 
 def number(value: float) -> str:

@@ -76,10 +76,10 @@ def machine(packages: tuple[str, ...] = ("numpy", "numba", "gymnasium")) -> dict
     }
 
 
-def save(name: str, command: str, measured: dict[str, Any]) -> Path:
-    """Write a measurement with its machine and command to results/NAME.json."""
-    RESULTS.mkdir(exist_ok=True)
-    path = RESULTS / f"{name}.json"
+def save(name: str, command: str, measured: dict[str, Any], folder: Path = RESULTS) -> Path:
+    """Write a measurement with its machine and command to results/NAME.json, or into another folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.json"
     record = {"command": command, "machine": machine(), **measured}
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return path

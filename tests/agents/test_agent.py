@@ -13,7 +13,6 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents import load_agent, shipped_agents
-from agents.activation import Tanh
 from agents.agent import PRETRAINED
 from agents.agent_file import TENSORS, TEXT, AgentFile, read_agent, save_agent
 from agents.evaluation import MISSIONS, evaluate
@@ -46,7 +45,7 @@ def rewrite(folder, **changes):
     ("algorithm", "policy"),
     [
         (PPO, {}),
-        (PPO, {"activation_fn": Tanh, "net_arch": [128, 128]}),
+        (PPO, {"activation_fn": torch.nn.ReLU, "net_arch": [128, 128]}),
         (SAC, {}),
         (SAC, {"activation_fn": torch.nn.Tanh, "net_arch": [32]}),
         (TD3, {}),

@@ -12,7 +12,6 @@ import torch
 import yaml
 
 from agents import run_log, training
-from agents.activation import Tanh
 from agents.agent_file import read_agent
 from agents.algorithms import ALGORITHMS
 from agents.checkpoint import checkpoints
@@ -281,16 +280,6 @@ def test_mission_mix_is_its_parts():
     assert mix.get_attr("num_envs") == [3, 3, 3, 2, 2]
     with pytest.raises(ValueError, match="at least one environment"):
         MissionMix({})
-
-
-def test_tanh():
-    x = torch.linspace(-30.0, 30.0, 4001, dtype=torch.float64, requires_grad=True)
-    y = Tanh()(x)
-    torch.testing.assert_close(y, torch.tanh(x), atol=1e-12, rtol=0.0)
-    y.sum().backward()
-    torch.testing.assert_close(x.grad, 1.0 - torch.tanh(x.detach()) ** 2, atol=1e-12, rtol=0.0)
-    single = torch.linspace(-9.0, 9.0, 4001)
-    torch.testing.assert_close(Tanh()(single), torch.tanh(single), atol=3e-7, rtol=0.0)
 
 
 def test_held_out_seeds_lie_beyond_training():

@@ -1,0 +1,185 @@
+"""Failures as pictures: where flights ended, how, and in which worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents import failure_causes as causes
+from agents.failure_causes import Failure
+from agents.failure_table import short_name
+from agents.failure_worlds import BESIDE_COLUMN, BESIDE_LINE, MEDIA, Features
+from hydrone_gym.evaluation.statistics import wilson_interval
+from hydrone_gym.rendering import style
+from hydrone_gym.world.world import World
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_ORANGE = "#E69F00"  # of the same palette
+# Shape and colour tell causes apart, each alone.
+_MARKS = {
+    causes.SLID: ("o", style.BLUE),
+    causes.SLID_LATE: ("^", style.WATER),
+    causes.ROSE_OR_SANK: ("d", style.GREEN),
+    causes.SEEN: ("s", style.RED),
+    causes.LATE: ("v", _ORANGE),
+    causes.NEVER: ("*", style.BLACK),
+    causes.SLID_OUT: (">", style.BLUE),
+    causes.LEFT: (">", style.PURPLE),
+    causes.ROUGH_SPEED: ("P", style.PURPLE),
+    causes.ROUGH_TILT: ("P", _ORANGE),
+    causes.ROUGH_BOTH: ("P", style.RED),
+    causes.WAITED_IN_ZONE: ("X", _ORANGE),
+    causes.WAITED: ("X", style.BLACK),
+    causes.CIRCLED: ("X", style.PURPLE),
+    causes.MADE_WAY: ("X", style.GREEN),
+    causes.DIVERGED: ("h", style.BLACK),
+}
+_SERIES = (("o", style.BLUE), ("s", style.RED), ("^", style.GREEN))  # one a mission
+_GREY = "#888888"
+_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # s
+_KINDS = (4, 3, len(MEDIA))  # of worlds that the panels tell apart: 3 or more, and 2 or more spheres, are one kind
+_FEWEST = 30  # worlds that a point needs, or its interval says nothing
+
+
+def draw_where(failures: Sequence[Failure], missions: Sequence[str], world: World) -> Figure:
+    """Draw from the side where flights failed, a panel a mission: their paths and a mark of the cause at the end.
+
+    Args:
+        failures: of all missions.
+        missions: environment ids.
+        world: of the environments, for the box and the transition zone.
+    """
+    figure, panels = _panels(len(missions), (10.0, 5.0), sharey=True)
+    for panel, mission in zip(panels, missions, strict=True):
+        those = [failure for failure in failures if failure.mission == mission]
+        panel.axhspan(-world.zone, world.zone, color=style.WATER, alpha=0.22, linewidth=0)
+        panel.axhline(0.0, color=style.BLUE, linewidth=1.0)
+        for failure in those:
+            panel.plot(*failure.path.T, color=_GREY, linewidth=0.5, alpha=min(1.0, 8.0 / len(those)))
+        _mark(panel, those, [(failure.end.share_of_way, failure.end.z_m) for failure in those])
+        panel.set_title(f"{short_name(mission)}: {len(those)} failures")
+        panel.set_xlabel("share of the way")
+        panel.set_xlim(-0.15, 1.15)
+        panel.set_ylim(world.lower[2], world.upper[2])
+    panels[0].set_ylabel("height z (m)")
+    return _finished(figure, panels)
+
+
+def draw_how(failures: Sequence[Failure]) -> Figure:
+    """Draw how flights failed: speeds at the end but for time-outs, and for collisions how long there was to act."""
+    figure, panels = _panels(2, (10.0, 5.0))
+    moving = [failure for failure in failures if failure.stayed_s is None]
+    panels[0].axhline(0.0, color=_GREY, linewidth=0.8)
+    _mark(panels[0], moving, [(f.end.horizontal_speed_m_s, f.end.vertical_speed_m_s) for f in moving])
+    panels[0].set_xlabel("horizontal speed at the end (m/s)")
+    panels[0].set_ylabel("vertical speed at the end (m/s)")
+    known, chance, those = [], [], []
+    for failure in failures:
+        if failure.contact is not None and failure.chance is not None and failure.contact.known_s is not None:
+            known.append(failure.contact.known_s)
+            chance.append(failure.chance.last_chance_s)
+            those.append(failure)
+    left, right = 0.8 * min([0.5, *known]), 1.2 * max([10.0, *known])
+    bottom, top = 0.8 * min([0.2, *chance]), 1.2 * max([3.0, *chance])
+    panels[1].fill_between([left, top], [left, top], top, color=_GREY, alpha=0.15, linewidth=0)
+    _mark(panels[1], those, list(zip(known, chance, strict=True)))
+    panels[1].text(0.03, 0.95, "seen too late", transform=panels[1].transAxes)
+    panels[1].set(xscale="log", yscale="log", xlim=(left, right), ylim=(bottom, top))
+    for axis, least, most in ((panels[1].xaxis, left, right), (panels[1].yaxis, bottom, top)):
+        ticks = [tick for tick in _TICKS if least <= tick <= most]
+        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+        axis.set_ticks([], minor=True)
+    panels[1].set_xlabel("sphere known before the contact (s)")
+    panels[1].set_ylabel("last chance before the contact (s)")
+    return _finished(figure, panels)
+
+
+def draw_worlds(worlds: Sequence[tuple[str, Features, NDArray[np.bool_]]]) -> Figure:
+    """Draw success against what worlds have in common, with 95 % Wilson intervals.
+
+    Args:
+        worlds: for each mission its environment id, the features of its worlds, and (n,) which flights arrived.
+    """
+    figure, panels = _panels(3, (10.0, 4.4), sharey=True)
+    for number, (mission, features, arrived) in enumerate(worlds):
+        line, column = np.minimum(features.beside_line, 3), np.minimum(features.beside_column, 2)
+        for panel, values, kinds in zip(panels, (line, column, features.media), _KINDS, strict=True):
+            _rates(panel, values, kinds, arrived, number, short_name(mission))
+    panels[0].set_ylabel("at the goal (%)")
+    panels[0].set_xticks(range(4), ["0", "1", "2", "3+"])
+    panels[0].set_xlabel(f"spheres within {BESIDE_LINE:g} m\nof the straight line")
+    panels[1].set_xticks(range(3), ["0", "1", "2+"])
+    panels[1].set_xlabel(f"spheres in the zone within {BESIDE_COLUMN:g} m\nof the column at the water end")
+    panels[2].set_xticks(range(len(MEDIA)), [media.replace(" to ", "\nto ") for media in MEDIA])
+    panels[2].set_xlabel("start and goal")
+    for panel, kinds in zip(panels, _KINDS, strict=True):
+        panel.set_xlim(-0.5, kinds - 0.5)
+        panel.grid(axis="y", alpha=0.3)
+    panels[0].set_ylim(top=100.0 + 0.03 * (100.0 - panels[0].get_ylim()[0]))
+    return _finished(figure, panels)
+
+
+def _rates(
+    panel: Axes, values: NDArray[np.int64], kinds: int, arrived: NDArray[np.bool_], number: int, label: str
+) -> None:
+    """Draw the rate of success of a mission's worlds of each kind, values 0 to `kinds` - 1; others are left out."""
+    points = []
+    for kind in range(kinds):
+        those = arrived[values == kind]
+        if len(those) >= _FEWEST:
+            points.append((kind, those.mean(), *wilson_interval(int(those.sum()), len(those))))
+    if not points:
+        return
+    kind, rate, low, high = np.array(points).T
+    shape, colour = _SERIES[number % len(_SERIES)]
+    panel.errorbar(
+        kind + 0.12 * (number - 1),
+        100.0 * rate,
+        100.0 * np.array([rate - low, high - rate]),
+        fmt=shape,
+        color=colour,
+        capsize=3,
+        label=label,
+    )
+
+
+def _panels(count: int, size: tuple[float, float], *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(style.FONTS):
+        figure = Figure(figsize=size, dpi=style.DOTS_PER_INCH, layout="constrained")
+        return figure, list(figure.subplots(1, count, sharey=sharey, squeeze=False)[0])
+
+
+def _mark(panel: Axes, failures: Sequence[Failure], points: Sequence[tuple[float, float]]) -> None:
+    """Put a mark of its cause at each failure's point; causes in one order, so that legends agree."""
+    for cause, (shape, colour) in _MARKS.items():
+        those = [point for failure, point in zip(failures, points, strict=True) if failure.cause == cause]
+        if those:
+            x, y = zip(*those, strict=True)
+            panel.scatter(
+                x, y, s=34, marker=shape, color=colour, edgecolor="white", linewidth=0.4, label=cause, zorder=3
+            )
+
+
+def _finished(figure: Figure, panels: Sequence[Axes]) -> Figure:
+    """Put one legend below the panels, each label once; say so in panels that have nothing to show."""
+    from matplotlib import rc_context
+
+    handles: dict[str, Any] = {}
+    for panel in panels:
+        shown, labels = panel.get_legend_handles_labels()
+        handles |= dict(zip(labels, shown, strict=True))
+        if not labels:
+            panel.text(0.5, 0.5, "none", ha="center", transform=panel.transAxes)
+    if handles:
+        with rc_context(style.FONTS):
+            figure.legend(handles.values(), handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure

@@ -1,0 +1,57 @@
+"""What worlds are like, so that those an agent fails in can be set against those it masters."""
+
+import sys
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+BESIDE_LINE = 1.0  # m from a sphere's surface to the straight line from start to goal
+BESIDE_COLUMN = 3.0  # m in plan from a sphere's surface to the column over or under the end in water
+MEDIA = ("air to air", "water to water", "air to water", "water to air")
+
+
+class Features(NamedTuple):
+    """Of many worlds, an entry a world."""
+
+    beside_line: NDArray[np.int64]  # (n,) spheres within BESIDE_LINE of the straight line
+    beside_column: NDArray[np.int64]  # (n,) spheres in the zone's way within BESIDE_COLUMN; -1 without a crossing
+    media: NDArray[np.int64]  # (n,) index in MEDIA
+
+
+def features_of(env: gym.Env, seeds: ArrayLike) -> Features:
+    """Return the features of the worlds that an environment draws from seeds (n,).
+
+    The column is that of the end in water, where the time-to-go lets the surface be crossed. A sphere is in the zone's
+    way if a vehicle inside the transition zone could touch it.
+    """
+    inner: Any = env.unwrapped
+    reach = inner.world.zone + inner.vehicle.radius
+    rows = []
+    for seed in np.asarray(seeds).tolist():
+        env.reset(seed=seed)
+        start, goal = np.array(inner.scenario.start[:3]), np.array(inner.scenario.goal)
+        spheres = inner.scenario.obstacles
+        column = goal if goal[2] < start[2] else start
+        beside = np.linalg.norm(spheres[:, :2] - column[:2], axis=1) - spheres[:, 3] <= BESIDE_COLUMN
+        in_way = np.abs(spheres[:, 2]) - spheres[:, 3] <= reach
+        media = MEDIA.index(" to ".join(inner.scenario.media))
+        near = np.sum(gaps_along(start, goal, spheres) <= BESIDE_LINE)
+        rows.append((near, np.sum(beside & in_way) if media >= 2 else -1, media))
+    return Features(*np.array(rows, np.int64).reshape(-1, 3).T)
+
+
+def gaps_along(a: NDArray[np.float64], b: NDArray[np.float64], spheres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the least distances (M,) in m from the straight path between two points (m) to the surfaces of spheres."""
+    along = b - a
+    offset = spheres[:, :3] - a
+    share = np.clip(offset @ along / max(float(along @ along), sys.float_info.min), 0.0, 1.0)
+    return np.linalg.norm(offset - share[:, None] * along, axis=1) - spheres[:, 3]
+
+
+def share_of_way(points: NDArray[np.float64], start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:
+    """Return how far along the line from start to goal points (n, 3) in m lie: 0 at the start, 1 at the goal."""
+    origin = np.asarray(start, np.float64)
+    way = np.asarray(goal, np.float64) - origin
+    return (points - origin) @ way / (way @ way)
