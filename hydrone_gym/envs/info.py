@@ -48,28 +48,22 @@ def crossings_of(log: np.ndarray, count: int) -> list[dict[str, Any]]:
     return crossings
 
 
-def batch_info(report: np.ndarray, transitions: np.ndarray) -> dict[str, Any]:
+def batch_info(report: np.ndarray, transitions: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
     """Return `info` for many rows, arrays with their masks as Gymnasium's vector environments give them.
 
     Args:
         report: (n, len(REPORT)).
         transitions: (n,) object, a list of crossings a row.
+        mask: (n,) which rows to fill in, the others are zero (None for objects); all unless given.
     """
-    columns = report.T.copy()
-    all_rows = np.ones((len(_BATCH) + len(TERMS), len(report)), bool)
+    if mask is None:
+        columns, crossings = report.T.copy(), transitions.copy()
+        masks = np.ones((len(_BATCH) + len(TERMS), len(report)), bool)
+    else:
+        columns, crossings = np.where(mask, report.T, 0.0), np.where(mask, transitions, None)
+        masks = np.repeat(mask[None], len(_BATCH) + len(TERMS), axis=0)
     terms: dict[str, Any] = dict(zip(TERMS, columns))
-    terms |= zip(_TERM_MASKS, all_rows)
-    values = (columns[_OUTCOME].astype(np.int64), *columns[_OUTCOME + 1 : _OUTCOME + 4], transitions.copy(), terms)
+    terms |= zip(_TERM_MASKS, masks)
+    values = (columns[_OUTCOME].astype(np.int64), *columns[_OUTCOME + 1 : _OUTCOME + 4], crossings, terms)
     info: dict[str, Any] = dict(zip(_BATCH, values, strict=True))
-    return info | dict(zip(_BATCH_MASKS, all_rows[len(TERMS) :], strict=True))
-
-
-def masked(info: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:
-    """Return a batch's info with only the rows of a mask (n,) filled in, the others zero (None for objects)."""
-    kept: dict[str, Any] = {}
-    for key, value in info.items():
-        if isinstance(value, dict):
-            kept[key] = masked(value, mask)
-        else:
-            kept[key] = np.where(mask, value, None if value.dtype == object else np.zeros((), value.dtype))
-    return kept
+    return info | dict(zip(_BATCH_MASKS, masks[len(TERMS) :], strict=True))

@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from hydrone_gym.envs.batch import EpisodeBatch
 from hydrone_gym.envs.egocentric import egocentric_space, relative_action_space
 from hydrone_gym.envs.egocentric_rows import EgocentricRows
-from hydrone_gym.envs.info import batch_info, crossings_of, masked
+from hydrone_gym.envs.info import batch_info, crossings_of
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.requests import check_scenario, load_references, requested_rows
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.spaces import action_space, observation_space
 from hydrone_gym.envs.task import REPORT
 from hydrone_gym.rendering.view import new_screen
-from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
+from hydrone_gym.simulation.outcome import GOAL, RUNNING, TIMEOUT
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle, named_vehicle
 
@@ -141,12 +141,9 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
                 check_scenario(scenario, self.options.world, self.options.vehicle.radius, self._sphere_space)
         self._seed(seed, rows)
         self._begin(rows, scenarios)
-        info = batch_info(self._batch.report, self._transitions)
-        if len(rows) == self.num_envs:
-            return self._observation(), info
         mask = np.zeros(self.num_envs, bool)
         mask[rows] = True
-        return self._observation(), masked(info, mask)
+        return self._observation(), batch_info(self._batch.report, self._transitions, mask)
 
     def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
@@ -212,9 +209,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         ended = outcome != RUNNING
         terminated = ended & ~truncated
         self._ended = ended.copy()
-        info = batch_info(report, self._transitions)
-        if ended.any():
-            info = self._finish(ended, info, same_step=mode == AutoresetMode.SAME_STEP)
+        info = self._info(ended, same_step=mode == AutoresetMode.SAME_STEP)
         return self._observation(), rewards, terminated, truncated, info
 
     def render(self) -> tuple[RenderFrame, ...] | None:
@@ -234,21 +229,24 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             log = self._batch.episodes.rows["crossing_log"][row]
             self._transitions[row] = [*self._transitions[row], *crossings_of(log, int(counts[row]))]
 
-    def _finish(self, ended: NDArray[np.bool_], info: dict[str, Any], *, same_step: bool) -> dict[str, Any]:
-        """Say who succeeded; in SAME_STEP mode keep the last observation and info and begin anew."""
-        success = ended & (info["outcome"] == 1)
+    def _info(self, ended: NDArray[np.bool_], *, same_step: bool) -> dict[str, Any]:
+        """Return the info of a step, which says who succeeded; in SAME_STEP mode ended rows begin anew first."""
+        report = self._batch.report
+        if not ended.any():
+            return batch_info(report, self._transitions)
+        success = {"is_success": report[:, _OUTCOME] == GOAL, "_is_success": ended.copy()}
         if not same_step:
-            return {**info, "is_success": success, "_is_success": ended.copy()}
+            return {**batch_info(report, self._transitions), **success}
         rows = np.flatnonzero(ended)
         last = self._observation()
         final = np.full(self.num_envs, None, dtype=object)
         for row in rows:
             final[row] = {k: v[row].copy() for k, v in last.items()} if isinstance(last, dict) else last[row].copy()
-        final_info = masked({**info, "is_success": success, "_is_success": ended.copy()}, ended)
+        final_info = {**batch_info(report, self._transitions, ended), **success}
         self._begin(rows, [None] * len(rows))
         self._ended = np.zeros(self.num_envs, bool)
         return {
-            **batch_info(self._batch.report, self._transitions),
+            **batch_info(report, self._transitions),
             "final_obs": final,
             "_final_obs": ended.copy(),
             "final_info": final_info,
