@@ -60,7 +60,8 @@ def batch_info(report: np.ndarray, transitions: np.ndarray, mask: np.ndarray | N
         columns, crossings = report.T.copy(), transitions.copy()
         masks = np.ones((len(_BATCH) + len(TERMS), len(report)), bool)
     else:
-        columns, crossings = np.where(mask, report.T, 0.0), np.where(mask, transitions, None)
+        columns, crossings = np.where(mask, report.T, 0.0), transitions.copy()
+        crossings[~mask] = None
         masks = np.repeat(mask[None], len(_BATCH) + len(TERMS), axis=0)
     terms: dict[str, Any] = dict(zip(TERMS, columns))
     terms |= zip(_TERM_MASKS, masks)

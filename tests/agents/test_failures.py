@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 from agents.evaluation import HELD_OUT, MISSIONS, evaluate, evaluate_missions, fly_worlds, policy_for, score_of
-from agents.failure_table import COLUMNS
-from agents.failure_worlds import MEDIA, features_of, gaps_along
-from agents.failures import find_failures, main
+from agents.failures.report import find_failures, main
+from agents.failures.tables import COLUMNS
+from agents.failures.worlds import MEDIA, features_of, gaps_along
 from hydrone_gym.evaluation import fly
 from hydrone_gym.simulation.outcome import Outcome
 from planners import StraightLine

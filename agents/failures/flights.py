@@ -105,7 +105,8 @@ def _known_since(
 def _stoppable(recorder: DecisionRecorder, shield: Shield) -> NDArray[np.bool_]:
     """Return for each decision whether the shield's check accepts the reference chosen, or one it would replace it by.
 
-    These include hovering where the vehicle is. What no one could know then, an undetected sphere, does not count.
+    Hovering where the vehicle is counts, and a retreat under water. What no one could know then, an undetected sphere,
+    does not hinder it.
     """
     batch = {key: np.stack([seen[key] for seen in recorder.observations]) for key in recorder.observations[0]}
     chosen = np.array(recorder.actions, np.float64)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import failure_causes as causes
-from agents.failure_causes import Failure
-from agents.failure_table import short_name
-from agents.failure_worlds import BESIDE_COLUMN, BESIDE_LINE, MEDIA, Features
+from agents.failures import causes
+from agents.failures.causes import Failure
+from agents.failures.tables import short_name
+from agents.failures.worlds import BESIDE_COLUMN, BESIDE_LINE, MEDIA, Features
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.rendering import style
+from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.world import World
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def draw_where(failures: Sequence[Failure], missions: Sequence[str], world: Worl
 def draw_how(failures: Sequence[Failure]) -> Figure:
     """Draw how flights failed: speeds at the end but for time-outs, and for collisions how long there was to act."""
     figure, panels = _panels(2, (10.0, 5.0))
-    moving = [failure for failure in failures if failure.stayed_s is None]
+    moving = [failure for failure in failures if failure.outcome is not Outcome.TIMEOUT]
     panels[0].axhline(0.0, color=_GREY, linewidth=0.8)
     _mark(panels[0], moving, [(f.end.horizontal_speed_m_s, f.end.vertical_speed_m_s) for f in moving])
     panels[0].set_xlabel("horizontal speed at the end (m/s)")

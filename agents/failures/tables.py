@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from agents.evaluation import Score
-from agents.failure_causes import CAUSES, PARTS, Chance, Contact, End, Failure
+from agents.failures.causes import CAUSES, PARTS, Chance, Contact, End, Failure
 
 # Units are part of the names; docs/failures.md says what each column means.
 COLUMNS = (
@@ -92,7 +92,7 @@ def _typical(failures: Sequence[Failure]) -> str:
             _median([contact.known_s for contact in contacts if contact.known_s is not None]),
             _median([chance.last_chance_s for chance in chances]),
             _median([chance.last_chance_speed_m_s for chance in chances]),
-            _median([failure.stayed_s for failure in those if failure.stayed_s is not None]),
+            _median([failure.stayed_s for failure in those]),
         )
         lines.append(_row(cause, str(len(those)), *cells))
     return "\n".join(lines)

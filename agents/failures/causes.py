@@ -12,23 +12,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.failure_flights import FailedFlight
-from agents.failure_worlds import gaps_along, share_of_way
+from agents.failures.flights import FailedFlight
+from agents.failures.worlds import gaps_along, share_of_way
 from hydrone_gym.evaluation.flight import Flight
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.world import World
 
-AIR_LEG, FROM_AIR, FROM_WATER, WATER_LEG = "air leg", "zone, from air", "zone, from water", "water leg"
+AIR_LEG, FROM_AIR, FROM_WATER, WATER_LEG = "air leg", "zone from air", "zone from water", "water leg"
 PARTS = (AIR_LEG, FROM_AIR, FROM_WATER, WATER_LEG)
 
 SEEN = "seen and not avoided"
 LATE = "seen too late to stop"
 NEVER = "never seen"
-SLID = "slid in the zone, seen in time"
-SLID_LATE = "slid in the zone, seen too late"
-ROSE_OR_SANK = "rose or sank in the zone, seen in time"
+SLID = "slid in the zone: seen in time"
+SLID_LATE = "slid in the zone: seen too late"
+ROSE_OR_SANK = "rose or sank in the zone: seen in time"
 LEFT = "left the box"
-SLID_OUT = "left the box, sliding in the zone"
+SLID_OUT = "left the box: sliding in the zone"
 ROUGH_SPEED = "rough crossing: lateral speed"
 ROUGH_TILT = "rough crossing: tilt"
 ROUGH_BOTH = "rough crossing: lateral speed and tilt"
@@ -93,7 +93,7 @@ class Failure:
         end: where and how.
         contact: of a collision, else None.
         chance: None for a time-out, and if there never was one.
-        stayed_s: of a time-out, how long it had been within 1 m of where it ended, s; else None.
+        stayed_s: how long it had been within 1 m of where it ended, s.
         interventions: periods in which a shield flew another reference than proposed; None without one.
         path: (K, 2) share of the way and height in m, at every decision and at the end.
     """
@@ -105,7 +105,7 @@ class Failure:
     end: End
     contact: Contact | None
     chance: Chance | None
-    stayed_s: float | None
+    stayed_s: float
     interventions: int | None
     path: NDArray[np.float64]
 
@@ -124,7 +124,7 @@ def examine(failed: FailedFlight, world: World) -> Failure:
         end=end,
         contact=contact,
         chance=chance,
-        stayed_s=_stayed(flight) if flight.outcome is Outcome.TIMEOUT else None,
+        stayed_s=_stayed(flight),
         interventions=flight.interventions,
         path=np.column_stack((share, flight.states[:, 2])),
     )

@@ -4,7 +4,6 @@
 failed once more with everything kept, and writes what it finds to a folder. docs/failures.md explains the columns.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,11 +24,11 @@ from agents.evaluation import (
     score_of,
     score_table,
 )
-from agents.failure_causes import Failure, examine
-from agents.failure_figures import draw_how, draw_where, draw_worlds
-from agents.failure_flights import fly_again
-from agents.failure_table import failure_tables, write_failures
-from agents.failure_worlds import features_of
+from agents.failures.causes import Failure, examine
+from agents.failures.figures import draw_how, draw_where, draw_worlds
+from agents.failures.flights import fly_again
+from agents.failures.tables import failure_tables, write_failures
+from agents.failures.worlds import features_of
 from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.rendering.style import DOTS_PER_INCH
 from hydrone_gym.simulation.outcome import Outcome
@@ -96,7 +95,3 @@ class FailureReport(HeldOutWorlds):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Report the failures of an agent as the arguments say; see `agents.evaluation.run_command`."""
     return run_command(FailureReport, "failures", arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
