@@ -7,6 +7,7 @@ import dataclasses
 import json
 import os
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -181,7 +182,7 @@ def score_table(scores: Sequence[Score]) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeldOutWorlds:
+class HeldOutWorlds(ABC):
     """What a command flies: an agent, once in each of many held-out worlds of every mission."""
 
     agent: str
@@ -202,9 +203,9 @@ class HeldOutWorlds:
         """Keyword options of the environment."""
         return {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
 
+    @abstractmethod
     def text(self) -> str:
         """Do what the command is for and return what is printed."""
-        raise NotImplementedError(f"{type(self).__name__} must define text()")
 
 
 @dataclass(frozen=True, kw_only=True)
