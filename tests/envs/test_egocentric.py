@@ -1,13 +1,11 @@
-"""The egocentric interface by value: what is seen, what is carried, and what an action means."""
+"""The egocentric interface by value: what is seen."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, World
 from hydrone_gym.envs.egocentric import (
@@ -16,55 +14,12 @@ from hydrone_gym.envs.egocentric import (
     Egocentric,
     Memory,
     egocentric_space,
-    observe_rows,
     pack_egocentric,
-    place_references,
     relative_action_space,
 )
 from hydrone_gym.envs.rays import REACH
 from hydrone_gym.simulation.simulation import Simulation
-from tests.envs.missions import AIR_TO_AIR, DIVE, SPHERE_BETWEEN, begin, same
-from tests.simulation.batches import random_references, random_rows
-
-WORLD = World()
-VAST = World(lower=(-500.0, -500.0, -500.0), upper=(500.0, 500.0, 500.0))
-EGO = Egocentric(Simulation(HYDRONE, WORLD))
-VAST_EGO = Egocentric(Simulation(HYDRONE, VAST))
-INDEX = {name: index for index, name in enumerate(NAMES)}
-
-
-def raw(state, goal=(0.0, 0.0, 5.0), spheres=(), reference=None):
-    """A raw observation; unless given, the reference is where the vehicle is."""
-    state = np.append(state, np.zeros(12 - len(state)))
-    known = np.zeros((20, 4))
-    known[: len(spheres)] = np.reshape(spheres, (-1, 4))
-    where = [*state[:3], state[5]] if reference is None else reference
-    return {"state": state, "reference": np.array(where), "goal": np.array(goal, float), "obstacles": known}
-
-
-def random_raw(rng, count=None, spheres=20):
-    """Raw observations anywhere in the box, as many as asked for or a single one; their start positions."""
-    n = 1 if count is None else count
-    rows = random_rows(rng, n, WORLD)
-    known = np.zeros((n, 20, 4))
-    for row in known[:, :spheres]:
-        row[:] = np.column_stack([rng.uniform(WORLD.lower, WORLD.upper, (spheres, 3)), rng.uniform(0.5, 1.5, spheres)])
-    batch = {
-        "state": rows["state"].copy(),
-        "integral": np.zeros((n, 4)),
-        "reference": random_references(rng, n, WORLD),
-        "goal": rng.uniform(WORLD.lower, WORLD.upper, (n, 3)),
-        "obstacles": known,
-    }
-    starts = rng.uniform(WORLD.lower, WORLD.upper, (n, 3))
-    return (batch, starts) if count is not None else ({key: value[0] for key, value in batch.items()}, starts[0])
-
-
-def entry(flat, name):
-    return float(flat[..., INDEX[name]])
-
-
-# ---------------------------------------------------------------------------------------------------------- by value
+from tests.envs.raw_observations import EGO, INDEX, VAST_EGO, WORLD, entry, extreme, random_raw, raw
 
 
 def free_way(position, direction, spheres, world, radius):
@@ -230,8 +185,6 @@ def test_the_frame_belongs_to_the_start_not_to_the_moment():
     assert entry(flat, "velocity_left") == pytest.approx(math.sqrt(0.5))
 
 
-# -------------------------------------------------------------------------------------------------------- symmetries
-
 UNIT = st.floats(-1.0, 1.0)
 
 
@@ -276,17 +229,6 @@ def test_quarter_turns_take_the_square_box_along(quarters):
         np.testing.assert_allclose(turned_flat, flat, atol=2e-6)
 
 
-# ---------------------------------------------------------------------------------------------------- always bounded
-
-
-def extreme(rng, *shape):
-    """Numbers of every size a float64 has, of either sign, and places on walls and on the surface among them."""
-    sizes = rng.choice([-1.0, 1.0], shape) * 10.0 ** rng.uniform(-320.0, 308.0, shape)
-    ordinary = rng.uniform(-10.0, 10.0, shape)
-    special = rng.choice([0.0, -0.0, 10.0, -10.0, -5.0, np.finfo(float).max, -np.finfo(float).max], shape)
-    return np.choose(rng.integers(0, 3, shape), [sizes, ordinary, special])
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_finite_and_bounded_whatever_the_input(seed):
     n, rng = 20_000, np.random.default_rng(seed)
@@ -299,160 +241,6 @@ def test_finite_and_bounded_whatever_the_input(seed):
         place = EGO.reference(np.tile([1.0, -1.0, 0.3], (n, 1)), batch, after)[:, :3]
         assert (place >= np.array(WORLD.lower) + 0.199).all()
         assert (place <= np.array(WORLD.upper) - 0.199).all()
-
-
-# ------------------------------------------------------------------------------------------------------------ memory
-
-
-def test_progress_clock():
-    """Time-to-go over level air is the distance: it counts from the last new least, not from the last fall."""
-    memory, clocks = None, []
-    for x in (0.0, 1.0, 1.0, 0.0, 0.5, 0.99, 1.5, 1.4, 2.0):
-        flat, memory = EGO.observe(raw([x, 0.0, 5.0], (8.0, 0.0, 5.0)), memory)
-        clocks.append(10 * entry(flat, "clock"))
-        assert memory.clock == pytest.approx(clocks[-1], abs=1e-6)
-    assert clocks == pytest.approx([0, 0, 1, 2, 3, 4, 0, 1, 0], abs=1e-6)
-    assert memory.least == pytest.approx(6.0 / 1.8)
-    np.testing.assert_array_equal(memory.start, [0.0, 0.0, 5.0])
-
-
-def test_clock_saturates():
-    flat, _ = EGO.observe(raw([0.0, 0.0, 5.0], (8.0, 0.0, 5.0)), Memory(np.zeros(3), 1.0, 200.0))
-    assert entry(flat, "clock") == 5.0
-
-
-def test_starting_drops_the_memory_of_those_rows_only():
-    batch, starts = random_raw(np.random.default_rng(3), 4)
-    old = Memory(starts, np.full(4, 0.5), np.full(4, 7.0))
-    where = np.array([False, True, False, True])
-    flat, memory = EGO.observe(batch, old, where)
-    fresh, begun = EGO.observe(batch)
-    kept, carried = EGO.observe(batch, old)
-    assert same(flat, np.where(where[:, None], fresh, kept))
-    assert same(memory.start, np.where(where[:, None], begun.start, carried.start))
-    assert same(memory.least, np.where(where, begun.least, carried.least))
-    np.testing.assert_array_equal(memory.clock, [8.0, 0.0, 8.0, 0.0])
-
-
-def test_nothing_is_changed_or_shared():
-    observation, start = random_raw(np.random.default_rng(4))
-    memory = Memory(start, np.float64(1.0), np.float64(2.0))
-    before = pickle.dumps((observation, memory))
-    flat, after = EGO.observe(observation, memory)
-    place = EGO.reference(np.zeros(3), observation, after)
-    assert pickle.dumps((observation, memory)) == before
-    assert same(EGO.observe(observation, memory), (flat, after))
-    given = [*observation.values(), *memory]
-    for result in (flat, place, *after):
-        assert not any(np.shares_memory(result, array) for array in given)
-
-
-# ------------------------------------------------------------------------------------------------------------ action
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.integers(0, 10_000), arrays(np.float32, 3, elements=st.floats(-1.0, 1.0, width=32)))
-def test_action_can_be_read_back_from_the_reference(seed, action):
-    observation, start = random_raw(np.random.default_rng(seed))
-    place = VAST_EGO.reference(action, observation, Memory(start, 1.0, 0.0)).astype(float)
-    x, y, z = place[:3] - observation["state"][:3]
-    way = observation["goal"][:2] - start[:2]
-    c, s = way / np.linalg.norm(way)
-    np.testing.assert_allclose([(c * x + s * y) / 2, (c * y - s * x) / 2, z / 1.5], action, atol=2e-6)
-
-
-def test_reference_stays_inside_the_box():
-    observation = raw([9.5, -9.5, -4.5], (9.5, 9.5, 5.0))  # x' is +y, y' is -x
-    memory = Memory(np.array([9.5, -9.5, -4.5]), 1.0, 0.0)
-    place = EGO.reference([-1.0, -1.0, -1.0], observation, memory)
-    np.testing.assert_allclose(place[:3], [9.8, -9.8, -4.8], atol=1e-6)
-
-
-def test_action_is_clipped_to_its_space():
-    observation = raw([0.0, 0.0, 4.0], (8.0, 0.0, 4.0))
-    _, memory = EGO.observe(observation)
-    np.testing.assert_array_equal(EGO.reference([1.5, -9.0, 1e30], observation, memory)[:3], [2.0, -2.0, 5.5])
-
-
-def test_yaw_reference_is_kept_in_air_and_is_the_heading_in_water():
-    for z, expected in ((2.0, 0.25), (-2.0, 1.5)):
-        observation = raw([0, 0, z, 0, 0, 1.5], reference=(0.0, 0.0, z, 0.25))
-        place = EGO.reference(np.zeros(3), observation, Memory(np.zeros(3), 1.0, 0.0))
-        assert place.dtype == np.float32
-        assert place[3] == np.float32(expected)
-
-
-# ------------------------------------------------------------------------------------------- one kernel, two sources
-
-
-@pytest.mark.parametrize("scenario", [AIR_TO_AIR, SPHERE_BETWEEN, DIVE])
-def test_rows_and_raw_observations_agree_bit_for_bit(scenario):
-    """A flight of the raw environment, seen from its storage and from what it returns."""
-    env, observation = begin(scenario, rough_transition="count")
-    ego, rng = Egocentric(env.simulation), np.random.default_rng(8)
-    starts, least, clock = np.zeros((1, 3)), np.full(1, np.inf), np.zeros(1)
-    out, place, memory = np.empty((1, OBSERVATION_SIZE), np.float32), np.empty((1, 4)), None
-    for _ in range(40):
-        rows, known, found = env._episodes.rows, env._episodes.known, env._episodes.found
-        observe_rows(rows, known, found, starts, least, clock, ego.values, 0, 1, out)
-        flat, memory = ego.observe(observation, memory)
-        assert same(flat, out[0])
-        assert flat in egocentric_space()
-        action = rng.uniform(-0.2, 1.0, (1, 3)).astype(np.float32)
-        place_references(rows, action, starts, ego.values, 0, 1, place)
-        reference = ego.reference(action[0], observation, memory)
-        assert same(reference.astype(np.float64), place[0])
-        assert reference in env.action_space
-        observation, _, terminated, truncated, _ = env.step(reference)
-        assert same(observation["reference"], place[0])
-        if terminated or truncated:
-            break
-    assert memory.clock.tobytes() == clock.tobytes()
-    assert memory.start.tobytes() == starts.tobytes()
-
-
-@pytest.mark.parametrize("count", [1, 7, 64])
-def test_a_batch_is_its_rows_bit_for_bit(count):
-    rng = np.random.default_rng(count)
-    batch, starts = random_raw(rng, count)
-    batch["obstacles"][::2, 5:] = 0.0
-    action = rng.uniform(-1.0, 1.0, (count, 3)).astype(np.float32)
-    memory = Memory(starts, rng.uniform(0.0, 20.0, count), np.arange(float(count)))
-    flat, after = EGO.observe(batch, memory)
-    places = EGO.reference(action, batch, after)
-    assert flat.dtype == places.dtype == np.float32
-    for n in range(count):
-        single = {key: value[n] for key, value in batch.items()}
-        one, own = EGO.observe(single, Memory(*(part[n] for part in memory)))
-        assert same(one, flat[n])
-        assert all(a.tobytes() == b[n].tobytes() for a, b in zip(own, after, strict=True))
-        assert same(EGO.reference(action[n], single, own), places[n])
-
-
-def test_parts_of_the_rows_are_left_alone():
-    rng = np.random.default_rng(2)
-    rows, out = random_rows(rng, 5, WORLD), np.full((5, OBSERVATION_SIZE), 9.0, np.float32)
-    rows["goal"] = 1.0
-    clock, places = np.full(5, 3.0), np.full((5, 4), 9.0)
-    spheres, found, starts = np.zeros((5, 2, 4)), np.zeros(5, np.int64), np.zeros((5, 3))
-    observe_rows(rows, spheres, found, starts, np.full(5, np.inf), clock, EGO.values, 1, 3, out)
-    place_references(rows, np.zeros((5, 3), np.float32), starts, EGO.values, 1, 3, places)
-    assert (out[1:3] <= 5.0).all()
-    assert (out[[0, 3, 4]] == 9.0).all()
-    assert (places[[0, 3, 4]] == 9.0).all()
-    np.testing.assert_array_equal(clock, [3.0, 0.0, 0.0, 3.0, 3.0])
-
-
-def test_every_caller_shares_one_compiled_version():
-    batch, _ = random_raw(np.random.default_rng(0), 3)
-    _, memory = EGO.observe({key: value.astype(np.float32) for key, value in batch.items()})
-    turned_storage = {key: np.asfortranarray(value) for key, value in batch.items()}
-    EGO.observe(turned_storage, Memory(*map(np.asfortranarray, memory)), [0, 1, 0])
-    EGO.reference(np.zeros((3, 3), int), turned_storage, memory)
-    assert len(observe_rows.signatures) == len(place_references.signatures) == 1
-
-
-# ----------------------------------------------------------------------------------------------------- names, errors
 
 
 def test_names_and_spaces():
