@@ -96,7 +96,9 @@ def train(run: TrainingRun) -> list[Score]:
         raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
     torch.set_num_threads(run.threads)
     rows = MissionMix(recipe.missions, {**recipe.environment, **run.options}, shield=recipe.shield)
-    model = ALGORITHMS[run.algorithm].model(recipe.policy, rows, **_arguments(recipe), seed=run.seed, device="cpu")
+    model = ALGORITHMS[run.algorithm].model(
+        recipe.policy, rows, **recipe_arguments(recipe), seed=run.seed, device="cpu"
+    )
     if run.start_from is not None:
         model.set_parameters(_latest(run.start_from) / MODEL, device="cpu")
     run.folder.mkdir(parents=True, exist_ok=True)
@@ -121,7 +123,7 @@ def resume(folder: Path, *, progress: bool = True) -> list[Score]:
     return _learn(run, recipe, model, extra["spent"])
 
 
-def _arguments(recipe: Recipe) -> dict[str, Any]:
+def recipe_arguments(recipe: Recipe) -> dict[str, Any]:
     """Complete the recipe's settings: rectifiers between layers, cheaper than PPO's tanh; more episodes remembered."""
     arguments = recipe.arguments()
     policy = {"activation_fn": torch.nn.ReLU, **arguments.get("policy_kwargs", {})}

@@ -23,6 +23,7 @@ ORDER = (
     "peers",
     "c_reference",
     "edges",
+    "learning",
     "threads",
     "neighbour",
     "memory",

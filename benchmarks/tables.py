@@ -85,6 +85,11 @@ def edges(measured: dict[str, Any]) -> Sheet:
     return Sheet("Tree edges of 0.5 s a CPU second", ("edges", "edges/s", "of CL-RRT's"), rows)
 
 
+def learning(measured: dict[str, Any]) -> Sheet:
+    rows = [(name, number(entry["rate"]), f"± {100 * entry['spread']:.0f} %") for name, entry in measured.items()]
+    return Sheet("PPO inside Stable-Baselines3, transitions a CPU second", ("", "steps/s", "spread"), rows)
+
+
 def threads(measured: dict[str, Any]) -> Sheet:
     rows = [
         (f"{size} rows", *(number(measured["steps_per_second"][f"{size} rows, {k}"]) for k in (1, 2)), f"{ratio:.2f}")
@@ -169,6 +174,7 @@ def c_reference(measured: dict[str, Any]) -> Sheet:
 BUILDERS: dict[str, Callable[[dict[str, Any]], Sheet]] = {
     "environments": environments,
     "edges": edges,
+    "learning": learning,
     "threads": threads,
     "neighbour": neighbour,
     "memory": memory,

@@ -23,8 +23,8 @@ from benchmarks import conditions, edges, tables
 from benchmarks.environments import Flights, has_egocentric, has_vector_env, pendulum, single, vector
 from benchmarks.timing import Contestant, in_turns, save
 
-Part = Literal["environments", "edges", "threads", "neighbour", "memory", "start", "versions"]
-PARTS: tuple[Part, ...] = ("environments", "edges", "threads", "neighbour", "memory", "start", "versions")
+Part = Literal["environments", "edges", "learning", "threads", "neighbour", "memory", "start", "versions"]
+PARTS: tuple[Part, ...] = ("environments", "edges", "learning", "threads", "neighbour", "memory", "start", "versions")
 NEEDS_VECTOR = ("threads", "neighbour", "memory", "versions")
 SIZES = (1, 64, 1024, 4096)
 
@@ -90,12 +90,22 @@ def tree_edges(settings: Settings) -> dict[str, Any]:
     return {contestant.name: {"rate": contestant.rate, "spread": contestant.spread} for contestant in contestants}
 
 
+def learning(settings: Settings) -> dict[str, Any]:
+    """Transitions a CPU second inside Stable-Baselines3, in turns."""
+    from benchmarks.learning import contestants  # needs torch
+
+    found = [pendulum(), *contestants()]
+    in_turns(found, settings.rounds, settings.seconds)
+    return {contestant.name: {"rate": contestant.rate, "spread": contestant.spread} for contestant in found}
+
+
 def main() -> int:
     settings = tyro.cli(Settings, description=__doc__)
     vectors = has_vector_env()
     measures: dict[str, Callable[[], dict[str, Any]]] = {
         "environments": lambda: environments(settings),
         "edges": lambda: tree_edges(settings),
+        "learning": lambda: learning(settings),
         "threads": conditions.threads,
         "neighbour": conditions.neighbour,
         "memory": lambda: conditions.memory(settings.steps),
