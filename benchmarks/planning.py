@@ -18,6 +18,7 @@ import numpy as np
 import tyro
 from joblib import Parallel, delayed
 
+from benchmarks.freeze_suites import DENSE
 from hydrone_gym import save_scenario
 from hydrone_gym.evaluation import Record, fly, percentiles, wilson_interval
 from hydrone_gym.evaluation.provenance import commit, machine
@@ -35,7 +36,7 @@ SETS = {
     "air-water": ScenarioLaw(media=("air", "water")),
     "water-air": ScenarioLaw(media=("water", "air")),
 }
-DENSITIES = {20: (0.5, 1.5), 40: (0.8, 1.8)}
+DENSITIES = {20: (0.5, 1.5), 40: DENSE}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from PIL import Image
 from rich.console import Console
 
 import hydrone_gym  # noqa: F401  (registers the environments)
-from benchmarks import tables
+from benchmarks import freeze_suites, tables
 from benchmarks.timing import ROOT, Contestant, in_turns, save
 from hydrone_gym.evaluation import Flight, fly
 from hydrone_gym.rendering.frame import Painter
@@ -22,7 +22,7 @@ from hydrone_gym.rendering.video import moment_of
 from hydrone_gym.rendering.view import View
 from planners import CLRRT
 
-DENSE = {"num_obstacles": 40, "obstacle_radius": (0.8, 1.8)}
+DENSE = {"num_obstacles": 40, "obstacle_radius": freeze_suites.DENSE}
 SCENES: dict[str, tuple[dict[str, Any], View]] = {
     "640 x 480, 20 spheres": ({}, View()),
     "640 x 480, 40 large spheres": (DENSE, View()),

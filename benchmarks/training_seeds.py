@@ -22,16 +22,17 @@ from rich.console import Console
 from agents.checkpoint import checkpoints
 from agents.evaluation import evaluate_missions
 from agents.recipe import load_recipe
-from agents.run_log import CHECKPOINTS, CURVE
+from agents.run_log import CHECKPOINTS, CURVE, FAILURES
 from agents.training import TrainingRun, resume, train
 from benchmarks.tables import Sheet, number
 from benchmarks.timing import RESULTS, save
+from benchmarks.world_shapes import SHAPES
 
 BEGINS_WITH = {"ppo_shielded": "ppo"}  # recipe: the one whose weights of the same seed it goes on from
-DENSE = {"num_obstacles": 40, "obstacle_radius": (0.8, 1.8)}
+DENSE = SHAPES["40 larger spheres"]
 LEARNT = 0.95  # success while exploring, the mean of a curve's last `WINDOW` lines
 WINDOW = 5
-UNSAFE = ("COLLISION", "OUT_OF_BOUNDS", "ROUGH_TRANSITION", "DIVERGED")
+UNSAFE = tuple(name for name in FAILURES if name != "TIMEOUT")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +86,7 @@ def flights(recipe: str, folder: Path, episodes: int) -> list[dict[str, Any]]:
     """Evaluate an agent as it is meant to fly: behind the shield if it was trained there, then in denser worlds too."""
     shield = load_recipe(recipe).shield
     cells = []
-    for worlds, options in (("20 spheres", {}), *([("40 larger spheres", DENSE)] if shield else [])):
+    for worlds, options in (("20 spheres", {}), *([(DENSE.name, DENSE.options)] if shield else [])):
         for score in evaluate_missions(folder / "agent", shield=shield, episodes=episodes, options=options):
             cells.append(
                 {"worlds": worlds, "mission": score.mission, "outcomes": score.outcomes, "share": score.success}
@@ -124,7 +125,8 @@ def sheets(measured: dict[str, Any]) -> list[Sheet]:
         rows,
         [
             f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo_shielded` behind the "
-            "shield, the others alone. The last column counts flights of all seeds. 40 larger spheres: 0.8–1.8 m."
+            "shield, the others alone. The last column counts flights of all seeds. "
+            f"{DENSE.name}: {DENSE.radii[0]}–{DENSE.radii[1]} m."
         ],
     )
     took = [

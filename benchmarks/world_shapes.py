@@ -13,6 +13,7 @@ from typing import Any, Literal
 import gymnasium as gym
 import numpy as np
 
+from benchmarks.freeze_suites import DENSE
 from hydrone_gym.envs.vector_env import HydroneVectorEnv
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.generator import (
@@ -29,6 +30,7 @@ from hydrone_gym.world.world import World
 
 SHAPED = "HydroneBenchmarks/Shaped-v0"
 WORLD = World()
+RANDOM = ScenarioLaw()
 BLOCK, BLOCKS = 512, 1000  # pairs of ends drawn at a time, and how many times before a law is called impossible
 _NEAREST = WORLD.zone + ZONE_MARGIN  # m: where random missions may begin and end, as in the generator
 _HIGHEST, _DEEPEST = WORLD.upper[2] - WALL_MARGIN, -WORLD.lower[2] - WALL_MARGIN
@@ -50,7 +52,7 @@ class EndLaw:
     air: tuple[float, float] = (_NEAREST, _HIGHEST)
     water: tuple[float, float] = (_NEAREST, _DEEPEST)
     wall: tuple[float, float] = (WALL_MARGIN, WORLD.upper[0])
-    distance: tuple[float, float] = (8.0, np.inf)
+    distance: tuple[float, float] = (RANDOM.min_separation, np.inf)
     across: float = np.inf
 
     def draw(self, rng: np.random.Generator) -> tuple[list[float], list[float]]:
@@ -72,12 +74,16 @@ class EndLaw:
         raise ValueError(f"no ends found in {BLOCK * BLOCKS} draws: {self}")
 
 
-RANDOM = ScenarioLaw()
+def _mirrored(end: Any) -> tuple[float, float, float]:
+    """The other side of the plane x = 0."""
+    x, y, z = end
+    return -x, y, z
+
+
 TRAINED = (RANDOM, EXPERIMENT_1, EXPERIMENT_2)
 # The box is symmetric, so the mirrored missions join the other two pairs of corners.
-MIRRORED = (
-    replace(EXPERIMENT_1, start=(9.0, -9.0, 8.0), goal=(-9.0, 9.0, -3.0)),
-    replace(EXPERIMENT_2, start=(-9.0, -9.0, -3.0), goal=(9.0, 9.0, 7.0)),
+MIRRORED = tuple(
+    replace(law, start=_mirrored(law.start), goal=_mirrored(law.goal)) for law in (EXPERIMENT_1, EXPERIMENT_2)
 )
 
 
@@ -100,10 +106,10 @@ class Shape:
     name: str
     reference: str = "as in training"
     missions: Sequence[ScenarioLaw | EndLaw] = TRAINED
-    spheres: int = 20
-    radii: tuple[float, float] = (0.5, 1.5)
+    spheres: int = RANDOM.num_obstacles
+    radii: tuple[float, float] = RANDOM.obstacle_radius
     vehicle: str = "paper"
-    sensor_range: float = 3.0
+    sensor_range: float = WORLD.sensor_range
 
     @property
     def options(self) -> dict[str, Any]:
@@ -145,7 +151,7 @@ SHAPES = {
         Shape(group="spheres", name="60 spheres", spheres=60),
         Shape(group="spheres", name="60 small spheres", spheres=60, radii=(0.2, 0.5)),
         Shape(group="spheres", name="8 big spheres", spheres=8, radii=(1.5, 2.5)),
-        Shape(group="spheres", name="40 larger spheres", spheres=40, radii=(0.8, 1.8)),
+        Shape(group="spheres", name="40 larger spheres", spheres=40, radii=DENSE),
         _ends("short", EndLaw(distance=(2.0, 6.0))),
         _ends("long in air", EndLaw(media=("air",), distance=(20.0, np.inf))),
         _ends("long in water", EndLaw(media=("water",), distance=(20.0, np.inf))),

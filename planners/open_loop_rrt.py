@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import WATER_DENSITY
+from hydrone_gym.world.gaps import gaps_along
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE
 from planners.policy import Known, PlannerPolicy, simulation_of
 
@@ -32,10 +33,7 @@ class Track(NamedTuple):
 
 def clearance(a: NDArray[np.float64], b: NDArray[np.float64], spheres: NDArray[np.float64]) -> float:
     """Least distance (m) from the straight edge a-b to the surface of a sphere; infinite without spheres."""
-    edge, offset = b - a, spheres[:, :3] - a
-    share = np.clip(offset @ edge / max(float(edge @ edge), 1e-12), 0.0, 1.0)
-    distance = np.linalg.norm(offset - share[:, None] * edge, axis=1) - spheres[:, 3]
-    return float(distance.min(initial=np.inf))
+    return float(gaps_along(a, b, spheres).min(initial=np.inf))
 
 
 class OpenLoopRRT(PlannerPolicy):

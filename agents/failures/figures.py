@@ -21,21 +21,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_ORANGE = "#E69F00"  # of the same palette
 # Shape and colour tell causes apart, each alone.
 _MARKS = {
     causes.SLID: ("o", style.BLUE),
     causes.SLID_LATE: ("^", style.WATER),
     causes.ROSE_OR_SANK: ("d", style.GREEN),
     causes.SEEN: ("s", style.RED),
-    causes.LATE: ("v", _ORANGE),
+    causes.LATE: ("v", style.ORANGE),
     causes.NEVER: ("*", style.BLACK),
     causes.SLID_OUT: (">", style.BLUE),
     causes.LEFT: (">", style.PURPLE),
     causes.ROUGH_SPEED: ("P", style.PURPLE),
-    causes.ROUGH_TILT: ("P", _ORANGE),
+    causes.ROUGH_TILT: ("P", style.ORANGE),
     causes.ROUGH_BOTH: ("P", style.RED),
-    causes.WAITED_IN_ZONE: ("X", _ORANGE),
+    causes.WAITED_IN_ZONE: ("X", style.ORANGE),
     causes.WAITED: ("X", style.BLACK),
     causes.CIRCLED: ("X", style.PURPLE),
     causes.MADE_WAY: ("X", style.GREEN),

@@ -1,11 +1,12 @@
 """What worlds are like, so that those an agent fails in can be set against those it masters."""
 
-import sys
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from hydrone_gym.world.gaps import gaps_along
 
 BESIDE_LINE = 1.0  # m from a sphere's surface to the straight line from start to goal
 BESIDE_COLUMN = 3.0  # m in plan from a sphere's surface to the column over or under the end in water
@@ -40,14 +41,6 @@ def features_of(env: gym.Env, seeds: ArrayLike) -> Features:
         near = np.sum(gaps_along(start, goal, spheres) <= BESIDE_LINE)
         rows.append((near, np.sum(beside & in_way) if media >= 2 else -1, media))
     return Features(*np.array(rows, np.int64).reshape(-1, 3).T)
-
-
-def gaps_along(a: NDArray[np.float64], b: NDArray[np.float64], spheres: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least distances (M,) in m from the straight path between two points (m) to the surfaces of spheres."""
-    along = b - a
-    offset = spheres[:, :3] - a
-    share = np.clip(offset @ along / max(float(along @ along), sys.float_info.min), 0.0, 1.0)
-    return np.linalg.norm(offset - share[:, None] * along, axis=1) - spheres[:, 3]
 
 
 def share_of_way(points: NDArray[np.float64], start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:

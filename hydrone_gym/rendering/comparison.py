@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Okabe and Ito's eight; yellow last, for it is faint on white
 COLOURS = (
     style.BLUE,
-    "#E69F00",
+    style.ORANGE,
     style.GREEN,
     style.PURPLE,
     style.WATER,

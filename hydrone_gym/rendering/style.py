@@ -5,6 +5,7 @@ PURPLE = "#CC79A7"  # reddish purple: branches under water, the goal
 BLUE = "#0072B2"  # crossings
 WATER = "#56B4E9"  # the water surface and the transition zone
 GREEN = "#009E73"  # bluish green: a mission that ended at its goal
+ORANGE = "#E69F00"  # what the others leave over
 BLACK = "#000000"  # references, the start
 DETECTED = ("#1c1c1c", "#747474")  # darkest and lightest shade of an obstacle the vehicle knows
 FAINT = ("#e3e3e3", "#fafafa")  # the same for one it never came near

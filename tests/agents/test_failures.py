@@ -10,9 +10,10 @@ from PIL import Image
 from agents.evaluation import HELD_OUT, MISSIONS, evaluate, evaluate_missions, fly_worlds, policy_for, score_of
 from agents.failures.report import find_failures, main
 from agents.failures.tables import COLUMNS
-from agents.failures.worlds import MEDIA, features_of, gaps_along
+from agents.failures.worlds import MEDIA, features_of
 from hydrone_gym.evaluation import fly
 from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.world.gaps import gaps_along
 from planners import StraightLine
 
 EPISODES = 12
