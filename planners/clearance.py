@@ -3,7 +3,7 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined
-from hydrone_gym.world.obstacles import swept_distance
+from hydrone_gym.world.bodies import segment_distance
 
 
 @inlined
@@ -15,8 +15,6 @@ def clearance_between(a, b, spheres, first, count, radius):
     least = np.inf
     for j in range(first, count):
         k = 4 * j
-        distance = swept_distance(
-            a[0], a[1], a[2], b[0], b[1], b[2], spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3]
-        )
-        least = min(least, distance - radius)
+        body = (spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
+        least = min(least, segment_distance(a, b, body) - radius)
     return least

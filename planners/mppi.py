@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import kernel
+from hydrone_gym.control.envelope import envelope_of
 from hydrone_gym.simulation.block import CROSSING_FIELDS, LANES, LOGGED_CROSSINGS, new_block
-from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rows import advance_rows, new_rows
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.simulation.time_to_go import cruise_speeds, time_to_go
+from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
 from planners.policy import Known, PlannerPolicy, simulation_of
 from planners.straight_line import StraightLine
 
@@ -37,7 +37,8 @@ class Plan(NamedTuple):
 @kernel
 def add_costs(
     rows: np.ndarray,
-    values: NDArray[np.float64],
+    speeds: CruiseSpeeds,
+    zone: float,
     before: NDArray[np.float64],
     weight: float,
     costs: NDArray[np.float64],
@@ -46,18 +47,17 @@ def add_costs(
 
     Args:
         rows: (n,) dtype `ROW`.
-        values: packed `Model`.
+        speeds: of the vehicle.
+        zone: half-height of the transition zone, m.
         before: (n,) outcome before the period; what had ended costs no roughness.
         weight: of the time-to-go.
         costs: (n,) s.
     """
-    model = unpack_model(values)
-    speeds = cruise_speeds(model)
     for i in range(rows.size):
         s, g = rows[i].state, rows[i].goal
         left = time_to_go(s[0], s[1], s[2], g[0], g[1], g[2], speeds)
         costs[i] += 0.0 if rows[i].outcome == GOAL else weight * left
-        if before[i] == RUNNING and abs(s[2]) < model.world.zone:
+        if before[i] == RUNNING and abs(s[2]) < zone:
             costs[i] += _ROUGHNESS * (s[6] * s[6] + s[7] * s[7])
 
 
@@ -92,6 +92,7 @@ class MPPI(PlannerPolicy):
         self.samples, self.horizon, self.seed = samples, horizon, seed
         self._simulation = simulation
         self._line = StraightLine(simulation)
+        self._speeds = cruise_speeds(envelope_of(simulation.vehicle))
         self._low = np.array(simulation.world.lower, np.float32).astype(np.float64)
         self._high = np.array(simulation.world.upper, np.float32).astype(np.float64)
 
@@ -144,7 +145,7 @@ class MPPI(PlannerPolicy):
             ticks = sim.ticks
             advance_rows(rows, references, spheres, closest, count, sim.values, 0, ticks, ticks, block, log)
             weight = 1.0 if k == self.horizon - 1 else 1.0 / self.horizon
-            add_costs(rows, sim.values, before, weight, costs)
+            add_costs(rows, self._speeds, sim.world.zone, before, weight, costs)
         lost = np.maximum(0.0, 1.0 - rows["clearance"] / _MARGIN)
         failed = (rows["outcome"] != RUNNING) & (rows["outcome"] != GOAL)
         return costs + _NEARNESS * lost**2 + _FAILURE * failed

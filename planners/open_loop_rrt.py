@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import WATER_DENSITY
-from hydrone_gym.world.gaps import gaps_along
+from hydrone_gym.world.bodies import gaps_along
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE
 from planners.policy import Known, PlannerPolicy, simulation_of
 

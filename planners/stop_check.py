@@ -8,7 +8,7 @@ from hydrone_gym.simulation.advance import advance
 from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rows import load_row, store_row
-from hydrone_gym.world.obstacles import swept_distance
+from hydrone_gym.world.bodies import segment_distance
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, hover_reference, inside
 from planners.clearance import clearance_between
 
@@ -64,7 +64,8 @@ def _near(x, y, z, spheres, near):
     count = 0
     for j in range(spheres.size // 4):
         k = 4 * j
-        if swept_distance(x, y, z, x, y, z, spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3]) <= _NEAR:
+        body = (spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
+        if segment_distance((x, y, z), (x, y, z), body) <= _NEAR:
             for c in range(4):
                 near[4 * count + c] = spheres[k + c]
             count += 1

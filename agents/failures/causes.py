@@ -16,7 +16,7 @@ from agents.failures.flights import FailedFlight
 from agents.failures.worlds import share_of_way
 from hydrone_gym.evaluation.flight import Flight
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.world.gaps import gaps_along
+from hydrone_gym.world.bodies import gaps_along
 from hydrone_gym.world.world import World
 
 AIR_LEG, FROM_AIR, FROM_WATER, WATER_LEG = "air leg", "zone from air", "zone from water", "water leg"

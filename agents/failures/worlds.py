@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hydrone_gym.world.gaps import gaps_along
+from hydrone_gym.world.bodies import gaps_along
 
 BESIDE_LINE = 1.0  # m from a sphere's surface to the straight line from start to goal
 BESIDE_COLUMN = 3.0  # m in plan from a sphere's surface to the column over or under the end in water

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
+from hydrone_gym.world.bodies import meet_ray
 
 REACH = 4.0  # m: beyond the sensor's 3 m, because what was seen stays known
 AZIMUTHS = 12  # counter-clockwise from the frame's x'
@@ -58,20 +59,6 @@ def leave_box(x, y, z, dx, dy, dz, box):
 
 
 @inlined
-def meet_sphere(along, power):
-    """Distance (m) along a ray to a sphere: 0 inside it, infinity if missed.
-
-    Args:
-        along: component (m) of the sphere's centre along the ray.
-        power: squared distance of its centre less its squared radius (m^2), negative inside.
-    """
-    discriminant = along * along - power
-    t = along - np.sqrt(discriminant if discriminant > 0.0 else 0.0)
-    hit = power < 0.0 or (along > 0.0 and discriminant >= 0.0)
-    return (t if t > 0.0 else 0.0) if hit else np.inf
-
-
-@inlined
 def share_of_reach(distance):
     """Distance (m) as a share of the reach, in [0, 1]; what is not a number reads 1."""
     share = distance * (1.0 / REACH)
@@ -105,7 +92,7 @@ def cast_fixed(out, n, first, state, cosine, sine, known, found, box, radius):
             power = square - inflated * inflated
             ahead, left = cosine * ox + sine * oy, cosine * oy - sine * ox
             for k in range(FIXED):
-                share = share_of_reach(meet_sphere(ahead * _X[k] + left * _Y[k] + oz * _Z[k], power))
+                share = share_of_reach(meet_ray(ahead * _X[k] + left * _Y[k] + oz * _Z[k], power))
                 out[n, first + k] = min(out[n, first + k], np.float32(share))
 
 
@@ -120,6 +107,6 @@ def cast_along(n, state, vx, vy, vz, known, found, box, radius):
         ox, oy, oz = known[n, j, 0] - x, known[n, j, 1] - y, known[n, j, 2] - z
         inflated = known[n, j, 3] + radius
         power = ox * ox + oy * oy + oz * oz - inflated * inflated
-        t = meet_sphere(ox * dx + oy * dy + oz * dz, power)
+        t = meet_ray(ox * dx + oy * dy + oz * dz, power)
         least = t if t < least else least
     return share_of_reach(least) if length >= STILL else 1.0

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.envs.task import pack_task
-from hydrone_gym.physics.dynamics import is_air
 from hydrone_gym.simulation.time_to_go import CruiseSpeeds
+from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
 

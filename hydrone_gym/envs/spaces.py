@@ -5,6 +5,7 @@ import math
 import numpy as np
 from gymnasium import spaces
 
+from hydrone_gym.control.envelope import envelope_of
 from hydrone_gym.simulation.advance import RATE_BOUND, SPEED_BOUND, TICK
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
@@ -24,9 +25,8 @@ def observation_space(vehicle: Vehicle, world: World, num_obstacles: int) -> spa
     lower, upper = np.array(world.lower), np.array(world.upper)
     reference = action_space(world)
     moving = [math.pi / 2, math.pi / 2, math.pi] + 3 * [SPEED_BOUND] + 3 * [RATE_BOUND]
-    air, water = vehicle.air_gains, vehicle.water_gains
-    height = max(air.altitude_i_limit, water.depth_i_limit)
-    memory = np.array([height] + 3 * [max(air.attitude_i_limit, water.attitude_i_limit)])
+    envelope = envelope_of(vehicle)
+    memory = np.array([envelope.height_memory] + 3 * [envelope.attitude_memory])
     # A scenario may hold larger spheres than are drawn, and spheres that only reach into the box.
     size = float((upper - lower).max())
     return spaces.Dict(

@@ -1,21 +1,20 @@
 """The task around the simulation, for any number of rows: what is known at the start, and how a period is judged."""
 
 import math
-from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.control.envelope import envelope_of
 from hydrone_gym.envs.reward import TERMS, write_reward
-from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
 from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
 from hydrone_gym.vehicle import Vehicle
-from hydrone_gym.world.obstacles import swept_distance
+from hydrone_gym.world.bodies import segment_distance
 from hydrone_gym.world.sensing import detect
 from hydrone_gym.world.world import World
 
@@ -66,11 +65,7 @@ class TaskParams(NamedTuple):
 
 def pack_task(vehicle: Vehicle, world: World, time_limit: float) -> NDArray[np.float64]:
     """Flatten the constants of a task with a time limit in s to one array, which reaches a kernel fastest."""
-    compiled: Any = cruise_speeds
-    model = SimpleNamespace(
-        vehicle=vehicle_params(vehicle), air_gains=vehicle.air_gains, water_gains=vehicle.water_gains
-    )
-    speeds = compiled.py_func(model)
+    speeds = cruise_speeds(envelope_of(vehicle))
     return np.array([vehicle.radius, world.sensor_range, math.ceil(time_limit / TICK - 1e-9), *speeds])
 
 
@@ -96,8 +91,8 @@ def _begin(n, rows, obstacles, closest, potential, seen, found, known, lane, lan
     row.clearance = np.inf
     for j in range(count):
         k = 4 * j * lanes + lane
-        centre = obstacles[k], obstacles[k + lanes], obstacles[k + 2 * lanes]
-        distance = swept_distance(x, y, z, x, y, z, centre[0], centre[1], centre[2], obstacles[k + 3 * lanes])
+        body = (obstacles[k], obstacles[k + lanes], obstacles[k + 2 * lanes], obstacles[k + 3 * lanes])
+        distance = segment_distance((x, y, z), (x, y, z), body)
         closest[j * lanes + lane] = distance
         row.clearance = min(row.clearance, distance - params.radius)
         seen[n, j] = 0

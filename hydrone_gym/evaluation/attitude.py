@@ -8,10 +8,10 @@ from hydrone_gym.control.air import tilt_reference
 from hydrone_gym.control.reference import Reference
 from hydrone_gym.control.water import surge_and_heading
 from hydrone_gym.evaluation.flight import Trace
-from hydrone_gym.physics.dynamics import is_air
 from hydrone_gym.physics.kinematics import State, attitude_of
 from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.simulation import TICK, Simulation
+from hydrone_gym.surface import is_air
 
 
 @kernel

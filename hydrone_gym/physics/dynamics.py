@@ -11,6 +11,7 @@ from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates, to_b
 from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.physics.rotors import rotor_wrench
 from hydrone_gym.physics.trigonometry import wrap
+from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import HYDRONE, Vehicle, named_vehicle
 
 
@@ -23,12 +24,6 @@ class BodyAcceleration(NamedTuple):
     roll: float
     pitch: float
     yaw: float
-
-
-@inlined
-def is_air(z):
-    """Whether a height (m) is in air; the switch at the surface z = 0 is abrupt, as in the paper."""
-    return z > 0.0
 
 
 @inlined

@@ -10,13 +10,14 @@ import numpy as np
 from hydrone_gym._jit import inlined
 from hydrone_gym.control.law import control
 from hydrone_gym.control.reference import Integral, Reference
-from hydrone_gym.physics.dynamics import is_air, medium_at, step
+from hydrone_gym.physics.dynamics import medium_at, step
 from hydrone_gym.physics.kinematics import attitude_of
 from hydrone_gym.physics.rotors import shaft_power
 from hydrone_gym.physics.trigonometry import wrap
 from hydrone_gym.simulation.block import LOGGED_CROSSINGS, keep_or_restore, load_state, save_lane, store_state
 from hydrone_gym.simulation.outcome import COLLISION, DIVERGED, GOAL, OUT_OF_BOUNDS, ROUGH_TRANSITION, RUNNING
-from hydrone_gym.world.obstacles import inverse_square, path_distance
+from hydrone_gym.surface import is_air
+from hydrone_gym.world.bodies import inverse_square, path_distance
 
 DT = 0.01  # s: physics and control
 SUBSTEPS = 5  # physics steps a tick
@@ -114,20 +115,10 @@ def end_tick(b, i, model):
 def sweep(b, i, j, lanes, obstacles, closest, radius):
     """Measure lane i's path of this tick against obstacle j."""
     k = 4 * j * lanes + i
-    ax, ay, az = b.saved_x[i], b.saved_y[i], b.saved_z[i]
-    distance = path_distance(
-        ax,
-        ay,
-        az,
-        b.x[i] - ax,
-        b.y[i] - ay,
-        b.z[i] - az,
-        b.inverse_length2[i],
-        obstacles[k],
-        obstacles[k + lanes],
-        obstacles[k + 2 * lanes],
-        obstacles[k + 3 * lanes],
-    )
+    a = (b.saved_x[i], b.saved_y[i], b.saved_z[i])
+    d = (b.x[i] - a[0], b.y[i] - a[1], b.z[i] - a[2])
+    body = (obstacles[k], obstacles[k + lanes], obstacles[k + 2 * lanes], obstacles[k + 3 * lanes])
+    distance = path_distance(a, d, b.inverse_length2[i], body)
     running = b.outcome[i] == RUNNING
     near = closest[j * lanes + i]
     closest[j * lanes + i] = distance if running and distance < near else near

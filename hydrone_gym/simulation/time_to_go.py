@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hydrone_gym._jit import inlined
+from hydrone_gym.control.envelope import Envelope
+from hydrone_gym.surface import is_air
 
 GATE = 1.1  # m: crossings begin and end this far from the surface
 _SETTLE = 2.0  # s: coming to rest above or below the surface before a crossing
@@ -26,18 +28,10 @@ class CruiseSpeeds(NamedTuple):
     zone: float
 
 
-@inlined
-def cruise_speeds(model):
-    """Work out the speeds from gains and drag: surge thrust against drag in water, the limits elsewhere."""
-    water = model.vehicle.water
-    surge = np.sqrt(2.0 * model.water_gains.surge_limit * water.inverse_mass / water.drag_x)
-    return CruiseSpeeds(
-        _CRUISE * model.air_gains.speed_limit,
-        _CRUISE * model.air_gains.vertical_speed_limit,
-        _CRUISE * surge,
-        _CRUISE * model.water_gains.vertical_speed_limit,
-        model.air_gains.zone_speed_limit,
-    )
+def cruise_speeds(envelope: Envelope) -> CruiseSpeeds:
+    """Return the speeds that flights average, from the limits of a law."""
+    limits = envelope.cruise, envelope.climb, envelope.surge, envelope.dive
+    return CruiseSpeeds(*(_CRUISE * limit for limit in limits), envelope.zone)
 
 
 @inlined
@@ -45,7 +39,7 @@ def time_to_go(x, y, z, goal_x, goal_y, goal_z, speeds):
     """Return the time in s from a position to the goal (m), media and crossing considered, obstacles not."""
     dx, dy = goal_x - x, goal_y - y
     across = np.sqrt(dx * dx + dy * dy)
-    from_air, to_air = z > 0.0, goal_z > 0.0
+    from_air, to_air = is_air(z), is_air(goal_z)
     climbing = abs(goal_z - z)
     same_air = max(across / speeds.air, climbing / speeds.climb)
     same_water = max(across / speeds.water, climbing / speeds.dive)

@@ -9,7 +9,7 @@ R > 0.3 m. But the grid misses passages narrower than about one cell, so it errs
 import numpy as np
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym.world.obstacles import swept_distance
+from hydrone_gym.world.bodies import segment_distance
 from hydrone_gym.world.scenario import Scenario, check_radius, validate
 from hydrone_gym.world.world import World
 
@@ -43,11 +43,11 @@ def flight_space(world: World, vehicle_radius: float) -> np.ndarray:
 
 
 @inlined
-def _leg_is_clear(ax, ay, az, bx, by, bz, obstacles, inflation):
+def _leg_is_clear(a, b, obstacles, inflation):
     """Whether the straight leg a-b keeps more than the inflation (m) to every sphere."""
     for i in range(obstacles.shape[0]):
-        radius = obstacles[i, 3] + inflation
-        if swept_distance(ax, ay, az, bx, by, bz, obstacles[i, 0], obstacles[i, 1], obstacles[i, 2], radius) <= 0.0:
+        body = (obstacles[i, 0], obstacles[i, 1], obstacles[i, 2], obstacles[i, 3] + inflation)
+        if segment_distance(a, b, body) <= 0.0:
             return False
     return True
 
@@ -78,9 +78,9 @@ def has_simple_route(space, start, goal, obstacles):
         if outside or x <= box.lower[0] or x >= box.upper[0] or y <= box.lower[1] or y >= box.upper[1]:
             continue
         if (
-            _leg_is_clear(sx, sy, sz, x, y, first, obstacles, inflation)
-            and _leg_is_clear(x, y, second, gx, gy, gz, obstacles, inflation)
-            and _leg_is_clear(x, y, first, x, y, second, obstacles, inflation)
+            _leg_is_clear((sx, sy, sz), (x, y, first), obstacles, inflation)
+            and _leg_is_clear((x, y, second), (gx, gy, gz), obstacles, inflation)
+            and _leg_is_clear((x, y, first), (x, y, second), obstacles, inflation)
         ):
             return True
     return False

@@ -5,7 +5,6 @@ import numpy as np
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.model import unpack_model
-from hydrone_gym.simulation.time_to_go import cruise_speeds
 from planners.cl_rrt.crossing import STOP_TIME, column_is_free, cross, facing
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.references import AIR_GATE, WATER_GATE, air_reference, water_reference
@@ -64,7 +63,7 @@ def extend(work, values, goal, source, size, x, y, z, limit, step, objective, ma
     Returns the new size. Nodes of an extension that runs into something are kept and marked unsafe.
     """
     model = unpack_model(values)
-    speeds = cruise_speeds(model)
+    speeds = objective.speeds
     period = ticks * TICK
     current, first = source, size
     for _ in range(limit):

@@ -3,16 +3,14 @@
 The cost-to-go is the time-to-go of an empty world with each speed divided by the cost of a second at that speed.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from hydrone_gym._jit import inlined
-from hydrone_gym.physics.parameters import MediumParams, vehicle_params
+from hydrone_gym.control.envelope import envelope_of
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import SETTLE_SHARE, CruiseSpeeds, cruise_speeds, time_to_go
-from hydrone_gym.vehicle import Vehicle
 
 OBJECTIVES = ("time", "energy", "length", "paper")
 
@@ -25,41 +23,21 @@ class ObjectiveParams(NamedTuple):
     per_metre: float
     paper: float  # 1: choose the branch closest to the goal and cross where the line to a sample meets the zone
     rates: CruiseSpeeds  # metres for one unit of cost
-
-
-class _Constants(NamedTuple):
-    """The part of a `Model` that `cruise_speeds` reads, for calling it from Python."""
-
-    vehicle: object
-    air_gains: object
-    water_gains: object
+    speeds: CruiseSpeeds  # m/s
 
 
 def objective_params(simulation: Simulation, objective: str) -> ObjectiveParams:
     """Flatten an objective for a vehicle; raises ValueError for an unknown one."""
     if objective not in OBJECTIVES:
         raise ValueError(f"objective must be one of {', '.join(map(repr, OBJECTIVES))}, got {objective!r}")
-    vehicle = simulation.vehicle
-    speeds = cruise_speeds.py_func(_Constants(vehicle_params(vehicle), vehicle.air_gains, vehicle.water_gains))
+    envelope = envelope_of(simulation.vehicle)
+    speeds = cruise_speeds(envelope)
     if objective == "time":
-        return ObjectiveParams(1.0, 0.0, 0.0, 0.0, speeds)
+        return ObjectiveParams(1.0, 0.0, 0.0, 0.0, speeds, speeds)
     if objective == "energy":
-        return ObjectiveParams(0.0, 1.0, 0.0, 0.0, _divided(speeds, *_powers(vehicle)))
+        return ObjectiveParams(0.0, 1.0, 0.0, 0.0, _divided(speeds, envelope.flight_power, envelope.swim_power), speeds)
     one = CruiseSpeeds(1.0, 1.0, 1.0, 1.0, 1.0 / (1.0 - SETTLE_SHARE))
-    return ObjectiveParams(0.0, 0.0, 1.0, float(objective == "paper"), one)
-
-
-def _powers(vehicle: Vehicle) -> tuple[float, float]:
-    """Shaft power (W) of level flight, and of swimming at the surge limit while holding depth."""
-    params = vehicle_params(vehicle)
-    swimming = math.sqrt(vehicle.water_gains.surge_limit / params.water.thrust)
-    flight = _rotor_power(params.air, vehicle.hover_speed, 4)
-    swim = _rotor_power(params.water, swimming, 2) + _rotor_power(params.water, vehicle.neutral_speed, 2)
-    return flight, swim
-
-
-def _rotor_power(medium: MediumParams, speed: float, rotors: int) -> float:
-    return rotors * medium.power * abs(speed) ** 3
+    return ObjectiveParams(0.0, 0.0, 1.0, float(objective == "paper"), one, speeds)
 
 
 def _divided(speeds: CruiseSpeeds, air: float, water: float) -> CruiseSpeeds:

@@ -13,7 +13,7 @@ from agents.failures.tables import COLUMNS
 from agents.failures.worlds import MEDIA, features_of
 from hydrone_gym.evaluation import fly
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.world.gaps import gaps_along
+from hydrone_gym.world.bodies import gaps_along
 from planners import StraightLine
 
 EPISODES = 12

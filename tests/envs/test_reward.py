@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, World
-from hydrone_gym._jit import kernel
+from hydrone_gym.control.envelope import envelope_of
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import pack_task
-from hydrone_gym.simulation.model import pack_model, unpack_model
+from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import cruise_speeds
+from planners.cl_rrt.objective import objective_params
 from tests.envs.missions import AIR_TO_AIR, IDS, begin, fly_to, make, wander
 
 NAMED = {"progress", "time", "collision", "rough_crossing", "goal"}
@@ -58,14 +59,8 @@ def test_time_and_slow():
     assert {info["reward_terms"]["slow"] for *_, info in returns} == {0.0, -0.025}
 
 
-@kernel
-def _cruise_speeds(values, out):
-    speeds = cruise_speeds(unpack_model(values))
-    out[0], out[1], out[2], out[3], out[4] = speeds.air, speeds.climb, speeds.water, speeds.dive, speeds.zone
-
-
 @pytest.mark.parametrize("vehicle", [HYDRONE, HYDRONE_PHYSICAL])
 def test_reward_and_planners_share_one_time_to_go(vehicle):
-    compiled = np.empty(5)
-    _cruise_speeds(pack_model(vehicle, World()), compiled)
-    np.testing.assert_array_equal(pack_task(vehicle, World(), 120.0)[3:], compiled)
+    speeds = pack_task(vehicle, World(), 120.0)[3:]
+    np.testing.assert_array_equal(speeds, cruise_speeds(envelope_of(vehicle)))
+    np.testing.assert_array_equal(speeds, objective_params(Simulation(vehicle, World()), "time").rates)

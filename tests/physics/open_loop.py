@@ -4,9 +4,10 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from hydrone_gym._jit import kernel
-from hydrone_gym.physics.dynamics import is_air, medium_at, step
+from hydrone_gym.physics.dynamics import medium_at, step
 from hydrone_gym.physics.kinematics import State, attitude_of
 from hydrone_gym.physics.parameters import vehicle_params
+from hydrone_gym.surface import is_air
 
 
 @kernel

@@ -9,7 +9,7 @@ from hydrone_gym._jit import kernel
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 from hydrone_gym.vehicle import HYDRONE
-from hydrone_gym.world.obstacles import swept_distance
+from hydrone_gym.world.bodies import segment_distance
 from hydrone_gym.world.world import World
 from tests.simulation.batches import play, random_references, random_rows
 
@@ -19,7 +19,7 @@ points = st.tuples(*[st.floats(-5.0, 5.0, allow_nan=False)] * 3).map(np.array)
 
 @kernel
 def swept(a, b, sphere):
-    return swept_distance(a[0], a[1], a[2], b[0], b[1], b[2], sphere[0], sphere[1], sphere[2], sphere[3])
+    return segment_distance(a, b, sphere)
 
 
 def sampled(a, b, sphere, count=2001):

@@ -1,0 +1,72 @@
+"""Obstacles as bodies: how far a path or a ray is from one. Spheres are the only shape so far.
+
+A body is a row of `BODY` numbers: x, y, z of the centre and the radius, in m. Whoever needs to know what a body looks
+like asks here: the simulation sweeps its path past them, sensing compares the same distance, rays meet them, planners
+keep away from them, and pictures draw them.
+"""
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym._jit import inlined
+
+BODY = 4  # numbers a body
+
+
+@inlined
+def inverse_square(dx, dy, dz):
+    """Return 1 over the squared length of a path (m), zero for a point: the division that all bodies share."""
+    length2 = dx * dx + dy * dy + dz * dz
+    return 1.0 / length2 if length2 > 0.0 else 0.0
+
+
+@inlined
+def path_distance(a, d, inverse, body):
+    """Least distance (m) from the straight path that leads from point a by d to the surface of a body.
+
+    Args:
+        a, d: (x, y, z), m.
+        inverse: `inverse_square` of d.
+        body: (x, y, z, r), m.
+    """
+    ox, oy, oz = body[0] - a[0], body[1] - a[1], body[2] - a[2]
+    t = (ox * d[0] + oy * d[1] + oz * d[2]) * inverse
+    t = t if t > 0.0 else 0.0
+    t = t if t < 1.0 else 1.0
+    ox, oy, oz = ox - t * d[0], oy - t * d[1], oz - t * d[2]
+    return np.sqrt(ox * ox + oy * oy + oz * oz) - body[3]
+
+
+@inlined
+def segment_distance(a, b, body):
+    """Least distance (m) from the segment between two points (x, y, z) to the surface of a body, negative inside it."""
+    d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    return path_distance((a[0], a[1], a[2]), d, inverse_square(d[0], d[1], d[2]), body)
+
+
+@inlined
+def meet_ray(along, power):
+    """Distance (m) along a ray to a sphere: 0 inside it, infinity if missed.
+
+    Args:
+        along: component (m) of the sphere's centre along the ray.
+        power: squared distance of its centre less its squared radius (m^2), negative inside.
+    """
+    discriminant = along * along - power
+    t = along - np.sqrt(discriminant if discriminant > 0.0 else 0.0)
+    hit = power < 0.0 or (along > 0.0 and discriminant >= 0.0)
+    return (t if t > 0.0 else 0.0) if hit else np.inf
+
+
+def gaps_along(a: NDArray[np.float64], b: NDArray[np.float64], bodies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the least distances (M,) in m from the straight path between two points (3,) to the surfaces of bodies.
+
+    Args:
+        a, b: ends of the path, m.
+        bodies: (M, 4) x, y, z, r in m.
+    """
+    along, offset = b - a, bodies[:, :3] - a
+    share = np.clip(offset @ along / max(float(along @ along), sys.float_info.min), 0.0, 1.0)
+    return np.linalg.norm(offset - share[:, None] * along, axis=1) - bodies[:, 3]
