@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined
 
 BODY = 4  # numbers a body
+NOWHERE = 1e160  # m: its square overflows, so a body there is at distance inf
 
 
 @inlined

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, World
-from hydrone_gym.control.envelope import envelope_of
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import pack_task
 from hydrone_gym.simulation.simulation import Simulation

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from hydrone_gym import _jit
-from hydrone_gym.simulation.block import LANES
-from hydrone_gym.simulation.rows import advance_rows, new_rows
+from hydrone_gym.simulation.rows import advance_rows
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import LANES, new_rows
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.world.world import World
 
