@@ -176,7 +176,7 @@ class _Rows:
     """A vector environment and its queue of worlds; rows without a world left fly their last one again, unnoted."""
 
     def __init__(self, name: str, make: MakePilot, queue: Sequence[int], rows: int) -> None:
-        count = max(1, min(rows, len(queue) // 2))
+        count = min(rows, len(queue), max(2, len(queue) // 2))
         self.env = gym.make_vec(
             name, num_envs=count, vectorization_mode="vector_entry_point", autoreset_mode="Disabled"
         )
