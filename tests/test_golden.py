@@ -1,8 +1,8 @@
 """Flights of fixed seeds are bit for bit what they were when `python -m benchmarks.golden record` noted them.
 
 The simulation gives the same bits on every machine, so recorded actions lead to the recorded flights anywhere, and most
-policies choose them again. What MPPI and the agent leave to NumPy may round differently on another processor: their first
-decisions must be the recorded ones within `CLOSE`, and where NumPy rounds as it did, so must their whole flights.
+policies choose them again. What MPPI and the agent leave to NumPy may round differently on another processor: their
+first decisions must be the recorded ones within `CLOSE`, and where NumPy rounds as it did, so must their whole flights.
 """
 
 import math
@@ -15,7 +15,7 @@ from benchmarks.golden_flights import PILOTS, Replay, fly_single, fly_vector
 
 RECORDED, ABOUT = load()
 WAYS = {"single": fly_single, "vector": fly_vector}
-ROUNDED = ("mppi", "ppo")  # choose by what NumPy makes of exponentials, products and hyperbolic tangents
+ROUNDED = ("mppi", "ppo")  # choose by what NumPy makes of exponentials, products and angles
 FLIGHTS = {name: 60 for name in PILOTS} | {"clrrt-published": 12, "mppi": 6}
 DECISIONS, CLOSE = 8, 1e-5  # periods of a flight; m or rad
 
