@@ -30,8 +30,7 @@ class Known(NamedTuple):
 def whole_number(name: str, value: Any, least: int) -> int:
     """Return a whole number that is large enough; raises ValueError naming it."""
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        rule = "that is not negative" if least == 0 else f"of at least {least}"
-        raise ValueError(f"{name} must be a whole number {rule}, got {value!r}")
+        raise ValueError(f"{name} must be a whole number of at least {least}, got {value!r}")
     return value
 
 
