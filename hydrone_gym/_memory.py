@@ -1,8 +1,9 @@
 """How kernels read and write named tuples of numbers: in arrays, in records, and across calls by address.
 
 A *kind* is a `NamedTuple` class whose fields are numbers or kinds again; in memory it is its numbers one after the
-other, `stride` apart, and a block of lanes holds number k of lane i at ``k * stride + i``. So what is stored is declared once, as a class, and nobody spells its fields a second time: not
-the row of an episode, not the lane of a block, not the model that Python packs, not the node of a tree.
+other, or a stride apart: a block of lanes holds number k of lane i at ``k * lanes + i``. So what is stored is declared
+once, as a class, and nobody spells its fields a second time: not the row of an episode, not the lane of a block, not
+the model that Python packs, not the node of a tree.
 
 All of this is one instruction a number in the machine code and one statement for the compiler's front end, where most
 of the time of a first compilation goes.
@@ -15,7 +16,8 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numpy.typing import NDArray
 
 _DOUBLE, _LONG, _BYTE = ir.DoubleType(), ir.IntType(64), ir.IntType(8)
@@ -69,10 +71,56 @@ def _start(builder: Any, kind: Any, value: Any) -> Any:
 
 
 def _place(builder: Any, base: Any, place: Any, k: int) -> Any:
-    """Pointer to number k of a kind at a place (at, i, stride). In two steps: one index would make LLVM unroll lanes."""
+    """Pointer to number k of a kind at a place (at, i, stride)."""
     at, i, stride = place
     field = builder.mul(builder.add(at, ir.Constant(_LONG, k), flags=["nsw"]), stride, flags=["nsw"])
     return builder.gep(builder.gep(base, [field], inbounds=True), [i], inbounds=True)
+
+
+class View(types.Type):
+    """Where a kind lies one number after the other: ``view.name`` reads a field when it is asked for, and no other."""
+
+    def __init__(self, kind: type) -> None:
+        """Remember the kind."""
+        self.kind = kind
+        super().__init__(name=f"View({kind.__module__}.{kind.__qualname__})")
+
+
+@register_model(View)
+class _ViewModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _DOUBLE.as_pointer())
+
+
+def _field(kind: Any, name: str) -> tuple[int, Any]:
+    """After how many numbers a field begins, and its Numba type."""
+    part = _parts(kind)[kind._fields.index(name)]
+    return offsets_of(kind)[kind._fields.index(name)], View(part) if _is_kind(part) else types.float64
+
+
+@infer_getattr
+class _ViewFields(AttributeTemplate):
+    key = View
+
+    def generic_resolve(self, view, name):
+        return _field(view.kind, name)[1] if name in view.kind._fields else None
+
+
+@lower_getattr_generic(View)
+def _read_field(context, builder, view, value, name):
+    offset, kind = _field(view.kind, name)
+    place = builder.gep(value, [ir.Constant(_LONG, offset)], inbounds=True)
+    return place if isinstance(kind, View) else builder.load(place, align=8)
+
+
+@intrinsic
+def view(typingctx, memory, at, kind):
+    """Look at memory, from number `at` on, as a kind; see `View`."""
+
+    def code(context, builder, sig, args):
+        return builder.gep(_start(builder, sig.args[0], args[0]), [args[1]], inbounds=True)
+
+    return View(kind.instance_class)(memory, types.intp, kind), code
 
 
 @intrinsic

@@ -1,7 +1,7 @@
 """What a planner believes: the model it predicts with, which is not the world it flies in.
 
 Truth is what the environment flies, perceived is what an observation says, and belief is the third thing: the nominal
-vehicle under its law, in the world as it is described, with the obstacles as they were last seen. The last come with each
+vehicle under its law, in the world as it is described, with the obstacles as they were last seen. These come with each
 observation; all else is a `Belief`. In a perfect world the three are equal, bit for bit.
 """
 

@@ -15,6 +15,6 @@ def clearance_between(a, b, lane, first, radius):
     `lane` is a rollout's: of its obstacles those numbered from `first` on are looked at.
     """
     least = np.inf
-    for j in range(first, lane.count):
+    for j in range(first, lane.number):
         least = min(least, segment_distance(a, b, gather(lane.obstacles, BODY * j, 0, 1, Pose)) - radius)
     return least

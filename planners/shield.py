@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym._memory import gather, packed, pointer, scatter
+from hydrone_gym._memory import gather, packed, pointer, scatter, view
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.rollout import Lane, Rollout, lane_of
-from hydrone_gym.simulation.storage import VESSEL, Pose, new_rows, vehicle_of, world_of
+from hydrone_gym.simulation.storage import VESSEL, Point, Pose, new_rows, vehicle_of, world_of
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import BODY, NOWHERE, segment_distance
 from planners.belief import Belief, belief_of
@@ -122,7 +122,7 @@ def guard(query, rollout, envelope, candidates, scratch):
     """
     all_lane = lane_of(rollout)
     world, radius = world_of(all_lane.values), vehicle_of(all_lane.values).radius
-    limits = gather(envelope, 0, 0, 1, Envelope)
+    limits = view(envelope, 0, Envelope)
     for n in range(query.rows.size):
         row = query.rows[n]
         vessel, s = pointer(row), state_of(pointer(row))
@@ -138,7 +138,15 @@ def guard(query, rollout, envelope, candidates, scratch):
         )
         margin = margin_left(MARGIN, vessel, lane, radius)
         check = Check(
-            lane, pointer(row.goal), vessel, world, limits, radius, margin, lane.ticks * TICK, pointer(scratch)
+            lane,
+            view(row.goal, 0, Point),
+            view(vessel, 0, Point),
+            world,
+            limits,
+            radius,
+            margin,
+            lane.ticks * TICK,
+            pointer(scratch),
         )
         proposed = gather(pointer(query.proposed), 4 * n, 0, 1, Pose)
         query.choice[n] = HELD

@@ -11,16 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym._memory import gather, pointer, shifted
-from hydrone_gym.control.envelope import Envelope
+from hydrone_gym._memory import shifted, view
 from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import Lane, propagate
-from hydrone_gym.simulation.storage import REFERENCE, VESSEL, Point, Pose
+from hydrone_gym.simulation.storage import REFERENCE, VESSEL, Pose
 from hydrone_gym.surface import is_air
-from hydrone_gym.world.world import WorldParams
 from planners.clearance import clearance_between
 
 AIR_GATE = 1.1  # m above the surface: crossings begin or end here; from 1.4 m the exit would lie beyond sensing
@@ -45,10 +43,10 @@ class Check(NamedTuple):
     """What every stop of a vehicle is checked with; pointers and numbers, made in a kernel."""
 
     lane: Lane
-    goal: Any  # pointer, m
-    eye: Any  # pointer to where the obstacles were last sensed from, m
-    world: WorldParams
-    envelope: Envelope
+    goal: Any  # view of a `Point`
+    eye: Any  # the same: where the obstacles were last sensed from
+    world: Any  # view of a `WorldParams`
+    envelope: Any  # view of an `Envelope`
     radius: float  # of the vehicle, m
     margin: float  # clearance to keep, m
     period: float  # s
@@ -74,14 +72,14 @@ def single(x, y, z, psi):
 
 @inlined
 def state_of(vessel):
-    """Read the `State` of a vessel."""
-    return gather(vessel, 0, 0, 1, State)
+    """Look at the `State` of a vessel."""
+    return view(vessel, 0, State)
 
 
 @inlined
 def reference_of(vessel):
     """Read the reference in force of a vessel, (x, y, z, psi)."""
-    r = gather(vessel, REFERENCE, 0, 1, Pose)
+    r = view(vessel, REFERENCE, Pose)
     return r.x, r.y, r.z, r.psi
 
 
@@ -98,7 +96,7 @@ def margin_left(wanted, vessel, lane, radius):
 
     Without this a vehicle that drifted or stopped within the margin could never move again.
     """
-    p = gather(vessel, 0, 0, 1, Point)
+    p = state_of(vessel)
     left = clearance_between((p.x, p.y, p.z), (p.x, p.y, p.z), lane, 0, radius) - GIVE
     return max(min(wanted, left), LEAST_MARGIN)
 
@@ -106,7 +104,7 @@ def margin_left(wanted, vessel, lane, radius):
 @inlined
 def sensed(check, vessel):
     """Whether a vehicle is in space sensed from the eye: nothing unknown can be in the way there."""
-    s, eye = gather(vessel, 0, 0, 1, Point), gather(check.eye, 0, 0, 1, Point)
+    s, eye = state_of(vessel), check.eye
     dx, dy, dz = s.x - eye.x, s.y - eye.y, s.z - eye.z
     reach = check.world.sensor_range - check.radius
     return dx * dx + dy * dy + dz * dz <= reach * reach
@@ -118,7 +116,7 @@ def hover_reference(check, vessel):
     w, s = check.world, state_of(vessel)
     air = is_air(s.z)
     ahead = check.envelope.ahead_air if air else check.envelope.ahead_water
-    psi = gather(vessel, REFERENCE, 0, 1, Pose).psi if air else s.psi
+    psi = view(vessel, REFERENCE, Pose).psi if air else s.psi
     z = s.z + ahead * s.vz
     z = max(z, AIR_GATE) if air else min(z, -WATER_GATE)
     x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
@@ -222,4 +220,4 @@ def goes_on(check, vessel, held):
     return HELD, held
 
 
-__all__ = ["HELD", "RETREAT", "Check", "can_stop", "follow", "goes_on", "pointer", "rests", "verify"]
+__all__ = ["HELD", "RETREAT", "Check", "can_stop", "follow", "goes_on", "rests", "verify"]

@@ -1,7 +1,7 @@
 """What a control law is, and the controller that flies one: rotor limits and memory.
 
-A law is one file that offers a `Law` and registers its kernel under the class of its gains. Nothing else knows which law
-flies: a model carries gains of some class, and that class decides what is compiled.
+A law is one file that offers a `Law` and registers its kernels under the class of its gains. Nothing else knows which
+law flies: a model carries gains of some class, and that class decides what is compiled.
 """
 
 from collections.abc import Callable

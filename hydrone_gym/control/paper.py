@@ -1,8 +1,8 @@
 """The paper's control laws: cascaded PID in air (eqs. 5-8), depth, pitch, heading and surge in water (eqs. 13-16).
 
-In air (deviations E10, E11 and the speed law) the commanded velocity is limited so that any reference is safe to send.
-In water (E12, E13) the mixing matrix is the printed one, but it mixes thrusts in newtons, and each rotor's speed follows
-by the signed root of its thrust: the thrust of a rotor is flat around rest, and a law linear in rpm sticks there.
+In air (deviations E10, E11 and the speed law) the commanded velocity is limited so that any reference is safe.
+In water (E12, E13) the mixing matrix is the printed one, but it mixes thrusts in newtons, and each rotor's speed
+follows by the signed root of its thrust: the thrust of a rotor is flat around rest, and a law linear in rpm sticks.
 """
 
 import math
@@ -21,8 +21,8 @@ from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.vehicle import AirGains, Vehicle, WaterGains
 
 # `AirGains` and `WaterGains` as the kernels read them, field for field.
-AirGainParams = namedtuple("AirGainParams", [field.name for field in fields(AirGains)])  # type: ignore[misc]
-WaterGainParams = namedtuple("WaterGainParams", [field.name for field in fields(WaterGains)])  # type: ignore[misc]
+AirGainParams = namedtuple("AirGainParams", [spec.name for spec in fields(AirGains)])  # type: ignore[misc]
+WaterGainParams = namedtuple("WaterGainParams", [spec.name for spec in fields(WaterGains)])  # type: ignore[misc]
 
 
 class PaperGains(NamedTuple):

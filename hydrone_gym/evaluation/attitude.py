@@ -43,7 +43,7 @@ def _write_references(
 def attitude_references(simulation: Simulation, trace: Trace) -> NDArray[np.float64]:
     """Return roll, pitch and yaw (rad) that the control law tracks at every tick of a trace, (N, 3).
 
-    What a law does not track is NaN: under the paper's law roll is free in water, and yaw while the vehicle holds still.
+    What a law does not track is NaN: by the paper's law roll is free in water, and yaw while the vehicle holds still.
     """
     out = np.empty((len(trace.times), 3))
     gains = named_law(simulation.law).gains_of(simulation.vehicle)

@@ -97,7 +97,7 @@ def note_crossing(b, i, lanes, crossed, new, attitude):
     cosine = attitude.c_phi * attitude.c_theta
     c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
     noted = Crossing(
-        c.count + 1.0,
+        c.number + 1.0,
         1.0 if is_air(new.z) else -1.0,
         c.speed2 if speed2 <= c.speed2 else speed2,
         c.cos_tilt if cosine >= c.cos_tilt else cosine,
@@ -128,7 +128,7 @@ def judge(b, i, lanes, w):
     inside = (
         w.x_min <= s.x and s.x <= w.x_max and w.y_min <= s.y and s.y <= w.y_max and w.z_min <= s.z and s.z <= w.z_max
     )
-    rough = c.count > 0.0 and w.rough_fails > 0.0
+    rough = c.number > 0.0 and w.rough_fails > 0.0
     rough = rough and (c.speed2 > w.rough_speed * w.rough_speed or c.cos_tilt < w.rough_cos_tilt)
     gx, gy, gz = s.x - goal.x, s.y - goal.y, s.z - goal.z
     arrived = gx * gx + gy * gy + gz * gz <= w.goal_radius * w.goal_radius
@@ -193,7 +193,7 @@ def log_crossings(b, lanes):
     """Write this tick's crossings to the lanes' logs: rare, so not vectorised."""
     for i in range(lanes):
         c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
-        if c.count > 0.0:
+        if c.number > 0.0:
             episode = gather(b, AT.episode, i, lanes, Episode)
             slot = int(episode.crossings)
             if slot < LOGGED_CROSSINGS:

@@ -56,7 +56,7 @@ class Lane(NamedTuple):
     block: Any
     obstacles: Any  # flat: x, y, z, r in m
     closest: Any
-    count: int  # of obstacles
+    number: int  # of obstacles
 
 
 class Rollout:
@@ -120,7 +120,7 @@ def propagate(lane, start, end, goal, reference):
     scatter(b, AT.episode, 0, 1, Episode(0.0, np.inf, np.float64(RUNNING), 0.0))
     new = Pose(reference[0], reference[1], reference[2], reference[3])
     set_move(b, 0, 1, new)
-    call(lane.address, b, lane.obstacles, lane.closest, lane.values, lane.count, 0, lane.ticks, lane.ticks)
+    call(lane.address, b, lane.obstacles, lane.closest, lane.values, lane.number, 0, lane.ticks, lane.ticks)
     for k in range(REFERENCE):
         end[k] = b[k]
     scatter(end, REFERENCE, 0, 1, new)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined
-from hydrone_gym._memory import fields_of, gather, offsets_of, packed, size_of
+from hydrone_gym._memory import fields_of, gather, offsets_of, packed, size_of, view
 from hydrone_gym.control.law import Law
 from hydrone_gym.control.reference import Integral
 from hydrone_gym.physics.kinematics import State
@@ -80,7 +80,7 @@ class CrossingEntry(NamedTuple):
 class Crossing(NamedTuple):
     """This tick's crossings: how many, the last direction, and the worst of them."""
 
-    count: float
+    number: float
     direction: float
     speed2: float  # lateral, m^2/s^2
     cos_tilt: float
@@ -147,16 +147,20 @@ def pack_model(vehicle: Vehicle, world: World, law: Law) -> NDArray[np.float64]:
 @inlined
 def model_of(values, gains):
     """Rebuild the `Model` of packed values inside a kernel; `gains` is the class of its law's gains."""
-    return Model(vehicle_of(values), world_of(values), gather(values, _GAINS_AT, 0, 1, gains))
+    return Model(
+        gather(values, 0, 0, 1, VehicleParams),
+        gather(values, _WORLD_AT, 0, 1, WorldParams),
+        gather(values, _GAINS_AT, 0, 1, gains),
+    )
 
 
 @inlined
 def vehicle_of(values):
-    """Read the `VehicleParams` of packed values."""
-    return gather(values, 0, 0, 1, VehicleParams)
+    """Look at the `VehicleParams` of packed values."""
+    return view(values, 0, VehicleParams)
 
 
 @inlined
 def world_of(values):
-    """Read the `WorldParams` of packed values."""
-    return gather(values, _WORLD_AT, 0, 1, WorldParams)
+    """Look at the `WorldParams` of packed values."""
+    return view(values, _WORLD_AT, WorldParams)

@@ -7,10 +7,8 @@ already been seen to come out on the other side.
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym._memory import gather
 from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
-from hydrone_gym.simulation.storage import Point
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
 from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING, node_state
@@ -52,7 +50,7 @@ def column_is_free(p, x, y):
 
 @inlined
 def at_gate(s, column):
-    """Whether a vehicle may leave the gate of a column (x, y, gate, psi) so slow that it only rises or sinks in the zone.
+    """Whether a vehicle may leave the gate of a column (x, y, gate, psi): so slow that in the zone it only rises or sinks.
 
     From below it need not lie still: water brakes it before the zone, and it cannot hold a place sideways anyway.
     """
@@ -68,7 +66,7 @@ def at_gate(s, column):
 @inlined
 def column_from(p, s, sample):
     """Return the column (x, y, gate, psi) that a vehicle at the gate crosses in: where it stops, turned to go on."""
-    w, goal, down = p.check.world, gather(p.check.goal, 0, 0, 1, Point), is_air(s.z)
+    w, goal, down = p.check.world, p.check.goal, is_air(s.z)
     ahead = p.check.envelope.stop_time if down else _AHEAD
     x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
     psi = s.psi

@@ -3,10 +3,9 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym._memory import gather, pointer
+from hydrone_gym._memory import pointer
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import propagate
-from hydrone_gym.simulation.storage import Point
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import node_state
 from planners.stop_check import single
@@ -61,5 +60,5 @@ def adopt(p, parent, slot, kind, ended, flown):
 @inlined
 def left_to_go(p, s):
     """Cost from a place (with x, y, z in m) to the goal in an empty world."""
-    goal = gather(p.check.goal, 0, 0, 1, Point)
+    goal = p.check.goal
     return cost_to_go(s.x, s.y, s.z, goal.x, goal.y, goal.z, p.objective)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym._memory import gather, pointer, scatter
+from hydrone_gym._memory import pointer, scatter, view
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.rollout import lane_of
-from hydrone_gym.simulation.storage import Pose, vehicle_of, world_of
+from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
@@ -82,7 +82,7 @@ def take_root(p, query):
 @inlined
 def prune_blocked(p, size, known_before):
     """Kill the edges that obstacles detected since the last cycle stand in the way of (Alg. 2, line 16)."""
-    if known_before >= p.check.lane.count:
+    if known_before >= p.check.lane.number:
         return
     for i in range(1, size):
         a, b = node_state(p, p.nodes[i].parent), node_state(p, i)
@@ -219,21 +219,21 @@ def planner_of(work, query, constants):
     """Gather what a cycle works with; the margins are those that the vehicle has room for where it is."""
     lane = lane_of(work.rollout)
     world, radius = world_of(lane.values), vehicle_of(lane.values).radius
-    settings = gather(constants.settings, 0, 0, 1, SettingParams)
+    settings = view(constants.settings, 0, SettingParams)
     vessel = pointer(query.start)
     margin = margin_left(settings.margin, vessel, lane, radius)
     check = Check(
         lane,
-        pointer(query.goal),
-        pointer(query.eye),
+        view(query.goal, 0, Point),
+        view(query.eye, 0, Point),
         world,
-        gather(constants.envelope, 0, 0, 1, Envelope),
+        view(constants.envelope, 0, Envelope),
         radius,
         min(margin, settings.rest_margin),
         lane.ticks * TICK,
         pointer(work.scratch),
     )
-    objective = gather(constants.objective, 0, 0, 1, ObjectiveParams)
+    objective = view(constants.objective, 0, ObjectiveParams)
     return Planner(work.nodes, work.path, work.backup, work.edges, check, settings, objective, margin)
 
 

@@ -5,9 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym._memory import gather
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.storage import Point
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.edge import left_to_go
 from planners.cl_rrt.extend import extend, in_sight
@@ -54,7 +52,7 @@ def between(u, low, high):
 @inlined
 def draw_point(p, draws, k, air):
     """Sample a point of one medium outside the zone, mostly around root and goal (Alg. 1, line 1)."""
-    w, root, goal = p.check.world, node_state(p, 0), gather(p.check.goal, 0, 0, 1, Point)
+    w, root, goal = p.check.world, node_state(p, 0), p.check.goal
     near = draws[k + 2] < _AROUND_SHARE
     x_low = max(w.x_min + _WALL, min(root.x, goal.x) - _AROUND) if near else w.x_min + _WALL
     x_high = min(w.x_max - _WALL, max(root.x, goal.x) + _AROUND) if near else w.x_max - _WALL
@@ -82,7 +80,7 @@ def draw_column(p, draws, k, roam):
 
     Roaming, the columns lie around the root and the point just beyond the surface.
     """
-    w, root, goal = p.check.world, node_state(p, 0), gather(p.check.goal, 0, 0, 1, Point)
+    w, root, goal = p.check.world, node_state(p, 0), p.check.goal
     from_air = is_air(root.z)
     at_goal = from_air and roam != ANY_MEDIUM
     cx = goal.x if at_goal else root.x
@@ -97,7 +95,7 @@ def draw_column(p, draws, k, roam):
 
 @inlined
 def next_node(p, size, sample, by_cost, stamp):
-    """Return the best untried open node for a sample, or -1: nearest, or least cost-to-come plus cost (sorted order)."""
+    """Return the best untried open node for a sample, or -1: nearest, or least cost-to-come plus cost (sorted)."""
     best, least = -1, np.inf
     rate = p.objective.rates.air if sample.air else p.objective.rates.water
     for i in range(size):
@@ -132,7 +130,7 @@ def least_cost(p, size):
 @inlined
 def any_beyond(p, size):
     """Whether the tree has an open node in the goal's medium."""
-    found, air = False, is_air(gather(p.check.goal, 0, 0, 1, Point).z)
+    found, air = False, is_air(p.check.goal.z)
     for i in range(size):
         n = p.nodes[i]
         found = found or (n.kind == OPEN and not n.dead and is_air(node_state(p, i).z) == air)
@@ -142,7 +140,7 @@ def any_beyond(p, size):
 @inlined
 def draw_sample(p, draws, k, roam, onward):
     """Draw a `Sample` (Alg. 1, line 1). `onward`: the goal's medium is reached, the goal is not, so most go there."""
-    goal, root_air = gather(p.check.goal, 0, 0, 1, Point), is_air(node_state(p, 0).z)
+    goal, root_air = p.check.goal, is_air(node_state(p, 0).z)
     goal_air, paper = is_air(goal.z), p.objective.paper > 0.0
     change = roam == ANY_MEDIUM or root_air != goal_air
     if draws[k] < p.settings.goal_bias:
@@ -186,7 +184,7 @@ def expand_tree(p, size, draws, iterations, roam):
     """
     for i in range(p.path.size):
         p.path[i] = -1
-    goal_air, paper = is_air(gather(p.check.goal, 0, 0, 1, Point).z), p.objective.paper > 0.0
+    goal_air, paper = is_air(p.check.goal.z), p.objective.paper > 0.0
     best, beyond = least_cost(p, size), any_beyond(p, size)
     for iteration in range(iterations):
         k = iteration * DRAWS

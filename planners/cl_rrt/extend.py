@@ -3,7 +3,7 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym._memory import gather, pointer
+from hydrone_gym._memory import pointer, view
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.crossing import column_is_free, cross, facing
@@ -57,10 +57,10 @@ def is_there(p, s, aim, change):
 @inlined
 def next_reference(p, i, aim, step):
     """Return where an edge from node i toward a point sends the reference (x, y, z, psi)."""
-    vessel, goal = pointer(p.nodes[i]), gather(p.check.goal, 0, 0, 1, Point)
+    vessel, goal = pointer(p.nodes[i]), p.check.goal
     if not is_air(node_state(p, i).z):
         return water_reference(p, vessel, aim)
-    psi = gather(vessel, REFERENCE, 0, 1, Pose).psi
+    psi = view(vessel, REFERENCE, Pose).psi
     # a vehicle on its way to the water turns in the air, where it is free to
     psi = psi if is_air(goal.z) else facing(aim.x, aim.y, goal.x, goal.y, psi)
     return air_reference(p, vessel, aim, psi, step)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined
-from hydrone_gym._memory import gather
+from hydrone_gym._memory import view
 from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import REFERENCE, Pose
@@ -19,7 +19,7 @@ _ALIGNED = 0.94  # cosine of the misalignment (20 degrees) below which the vehic
 @inlined
 def air_reference(p, vessel, aim, psi, step):
     """Step the reference linearly toward a point in air, at most `step` m on and `_LEAD` from the vehicle."""
-    w, s, old = p.check.world, state_of(vessel), gather(vessel, REFERENCE, 0, 1, Pose)
+    w, s, old = p.check.world, state_of(vessel), view(vessel, REFERENCE, Pose)
     dx, dy, dz = aim.x - old.x, aim.y - old.y, aim.z - old.z
     across = np.sqrt(dx * dx + dy * dy)
     scale = min(1.0, step / max(across, 1e-9), _CLIMB * p.check.period / 0.5 / max(abs(dz), 1e-9))

@@ -10,8 +10,6 @@ from hydrone_gym._memory import fields_of, pointer
 from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.storage import VESSEL, Flown
-from planners.cl_rrt.objective import ObjectiveParams
-from planners.cl_rrt.settings import SettingParams
 from planners.stop_check import Check, state_of
 
 # What a node is part of
@@ -66,8 +64,8 @@ class Planner(NamedTuple):
     backup: Any
     edges: Any
     check: Check  # of stops; holds rollout, goal, world and envelope
-    settings: SettingParams
-    objective: ObjectiveParams
+    settings: Any  # view of `SettingParams`
+    objective: Any  # view of `ObjectiveParams`
     margin: float  # clearance in m that edges keep
 
 
@@ -78,7 +76,7 @@ def new_nodes(capacity: int) -> np.ndarray:
 
 @inlined
 def node_state(p, i):
-    """Read the `State` of node i."""
+    """Look at the `State` of node i."""
     return state_of(pointer(p.nodes[i]))
 
 
