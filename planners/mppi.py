@@ -131,7 +131,7 @@ class MPPI(PlannerPolicy):
             air = in_air(rows["state"][:, 2])
             points = np.clip(rows["state"][:, :3] + offsets[:, k], self._low, self._high)
             psi = np.where(air, rows["reference"][:, 3], rows["state"][:, 5])
-            flock.fly(np.float32(np.column_stack([points, psi])).astype(np.float64))
+            flock.fly(np.column_stack([points, psi]).astype(np.float32).astype(np.float64))
             weight = 1.0 if k == self.horizon - 1 else 1.0 / self.horizon
             add_costs(rows, self._speeds, self._simulation.world.zone, before, weight, costs)
         lost = np.maximum(0.0, 1.0 - rows["clearance"] / _MARGIN)

@@ -7,7 +7,7 @@ follows by the signed root of its thrust: the thrust of a rotor is flat around r
 
 import math
 from collections import namedtuple
-from dataclasses import fields
+from dataclasses import astuple, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -33,11 +33,8 @@ class PaperGains(NamedTuple):
 
 
 def _gains_of(vehicle: Vehicle) -> PaperGains:
-    air, water = vehicle.air_gains, vehicle.water_gains
-    return PaperGains(
-        AirGainParams(*(getattr(air, name) for name in AirGainParams._fields)),
-        WaterGainParams(*(getattr(water, name) for name in WaterGainParams._fields)),
-    )
+    air, water = astuple(vehicle.air_gains), astuple(vehicle.water_gains)
+    return PaperGains(AirGainParams._make(air), WaterGainParams._make(water))
 
 
 @inlined

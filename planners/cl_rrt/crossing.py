@@ -50,7 +50,7 @@ def column_is_free(p, x, y):
 
 @inlined
 def at_gate(s, column):
-    """Whether a vehicle may leave the gate of a column (x, y, gate, psi): so slow that in the zone it only rises or sinks.
+    """Whether a vehicle may leave the gate of a column (x, y, gate, psi): too slow to move sideways in the zone.
 
     From below it need not lie still: water brakes it before the zone, and it cannot hold a place sideways anyway.
     """
