@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from hydrone_gym.rendering import caption, shapes
 from hydrone_gym.rendering.backdrop import Box
 from hydrone_gym.rendering.camera import Pose, chase, overview
-from hydrone_gym.rendering.canvas import Canvas
+from hydrone_gym.rendering.raycast import Canvas
 from hydrone_gym.rendering.figures import camera_azimuth
 from hydrone_gym.rendering.moment import Moment
 from hydrone_gym.rendering.view import View
@@ -42,7 +42,7 @@ class Painter:
         unit = self._unit(pose, position if following else np.zeros(3))
         widest = _VEHICLE_PIXELS * unit / (2.0 * self.vehicle.radius)
         scale = 1.0 if following else max(_OVERVIEW_SCALE, widest)
-        box = Box(*self.world.lower, *self.world.upper, self.world.zone, float(following))
+        box = Box(self.world.lower, self.world.upper, self.world.zone, float(following))
         image = self._canvas.picture(self._shapes(moment, pose, unit, scale), pose, box)
         caption.write(image, *caption.describe(moment.time, position[2], self.world.zone, moment.outcome))
         return image

@@ -7,14 +7,18 @@ for only in the tiles of the picture that it can reach, and a picture without sh
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.rendering.backdrop import Box, Camera, exit_colour, mix, near_wall, span_of, surface
-from hydrone_gym.rendering.solids import glass, meet, solid
+from hydrone_gym.rendering.camera import Pose, outlines
+from hydrone_gym.rendering.solids import CAPSULE, glass, meet, solid
 
 TILE = 8  # pixels
+_LAYERS = 32  # translucent things kept along one ray, the nearest
 _SURFACE, _NEAR_WALL = -1, -2
 _EMPTY = -1  # mark of a ray that met no shape and was given up
 _ABSORPTION = 0.027  # 1/m, of blue under water; twice that of green, four times that of red
@@ -49,16 +53,39 @@ def _keep(depths, layers, count, t, layer):
     return min(count + 1, depths.size)
 
 
+class Sight(NamedTuple):
+    """What all rays of a picture share.
+
+    Attributes:
+        camera, box: where it is taken from, and the world.
+        shapes: (n, len(SHAPE_FIELDS)) float64, m, and colours from 0 to 1.
+        geometry: (n, 9), what `_prepare` makes of them.
+        begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
+        depths, layers: (k,) float64 and int64, working storage: the most translucent things kept along one ray.
+    """
+
+    camera: Camera
+    box: Box
+    shapes: NDArray[np.float64]
+    geometry: NDArray[np.float64]
+    begins: NDArray[np.int64]
+    items: NDArray[np.int64]
+    depths: NDArray[np.float64]
+    layers: NDArray[np.int64]
+
+
 @inlined
-def _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, layers):
+def _trace(sight, tile, d, known):
     """Follow one ray, unless it meets no shape and what is there without shapes is known.
 
     Returns:
         Red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
     """
+    camera, box, shapes, geometry = sight.camera, sight.box, sight.shapes, sight.geometry
+    depths, layers = sight.depths, sight.layers
     end, hit, count = math.inf, -1, 0
-    for k in range(first, last):
-        item = items[k]
+    for k in range(sight.begins[tile], sight.begins[tile + 1]):
+        item = sight.items[k]
         t = meet(shapes[item, 0], shapes[item, 7], geometry[item], d)
         if t > 0.0 and t < end:
             if shapes[item, 14] < 1.0:
@@ -67,9 +94,9 @@ def _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, 
                 end, hit = t, item
     if known and hit < 0 and count == 0:
         return 0.0, 0.0, 0.0, _EMPTY
-    span = span_of(camera, box, d[0], d[1], d[2])
+    span = span_of(camera, box, d)
     inside = span.leave > max(span.enter, 0.0)
-    waterline = -camera.ez / d[2]
+    waterline = -camera.eye[2] / d[2]
     if inside and waterline > 0.0 and span.enter <= waterline and waterline <= span.leave and waterline < end:
         count = _keep(depths, layers, count, waterline, _SURFACE)
     if inside and span.enter > 0.0 and span.enter_axis < 2 and span.enter < end:
@@ -79,15 +106,15 @@ def _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, 
         colour, part = solid(shapes[hit], geometry[hit], d, end, camera)
         mark += part
     else:
-        colour = exit_colour(camera, box, span, d[0], d[1], d[2])
+        colour = exit_colour(camera, box, span, d)
     for i in range(count - 1, -1, -1):
         t, layer = depths[i], layers[i]
         if t < end:
             colour = _drown(colour, min(end, span.rise) - max(t, span.dive))
             if layer == _SURFACE:
-                paint, opacity = surface(camera, box, span, d[0], d[1], d[2], t)
+                paint, opacity = surface(camera, box, span, d, t)
             elif layer == _NEAR_WALL:
-                paint, opacity = near_wall(camera, box, span, d[0], d[1], d[2])
+                paint, opacity = near_wall(camera, box, span, d)
             else:
                 paint, opacity = glass(shapes[layer], geometry[layer], d, t, camera, box)
             colour = mix(colour, paint, opacity)
@@ -102,9 +129,9 @@ def _ray(camera, column, row, width, height):
     """Unit direction through a point of the image, in pixels from its upper left corner."""
     u = (column - 0.5 * width) * camera.pixel
     v = (0.5 * height - row) * camera.pixel
-    x = camera.fx + u * camera.rx + v * camera.ux
-    y = camera.fy + u * camera.ry + v * camera.uy
-    z = camera.fz + u * camera.rz + v * camera.uz
+    x = camera.forward[0] + u * camera.right[0] + v * camera.up[0]
+    y = camera.forward[1] + u * camera.right[1] + v * camera.up[1]
+    z = camera.forward[2] + u * camera.right[2] + v * camera.up[2]
     scale = 1.0 / math.sqrt(1.0 + u * u + v * v)
     return x * scale, y * scale, z * scale
 
@@ -128,15 +155,14 @@ def _smooth(marks, row, column):
 
 
 @inlined
-def _paint(image, row, column, fine, known, camera, box, shapes, geometry, items, first, last, depths, layers):
+def _paint(sight, tile, image, row, column, fine, known):
     """Paint one pixel with one ray, or with four if fine; return the mark of its last ray."""
     red, green, blue, mark = 0.0, 0.0, 0.0, 0
     rays = 4 if fine else 1
     for k in range(rays):
         x = column + 0.5 + (_CORNERS[k][0] if fine else 0.0)
         y = row + 0.5 + (_CORNERS[k][1] if fine else 0.0)
-        d = _ray(camera, x, y, image.shape[1], image.shape[0])
-        r, g, b, mark = _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, layers)
+        r, g, b, mark = _trace(sight, tile, _ray(sight.camera, x, y, image.shape[1], image.shape[0]), known)
         red, green, blue = red + r, green + g, blue + b
     if mark != _EMPTY:
         image[row, column, 0] = _byte(red / rays)
@@ -146,34 +172,102 @@ def _paint(image, row, column, fine, known, camera, box, shapes, geometry, items
 
 
 @kernel
-def cast(image, marks, known, shapes, geometry, begins, items, depths, layers, camera_values, box_values):
+def cast(image, marks, known, sight):
     """Paint a picture.
 
     Args:
         image: (height, width, 3) uint8, written.
         marks: (height, width) int64, what each pixel sees, written.
         known: whether image and marks hold the picture without shapes; the result is the same.
-        shapes: (n, len(SHAPE_FIELDS)) float64: m, and colours from 0 to 1.
-        geometry: (n, 9), what is the same for every ray, see `hydrone_gym.rendering.canvas`.
-        begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
-        depths, layers: (k,) float64 and int64, working storage: the most translucent things kept along one ray.
-        camera_values, box_values: a `Camera` and a `Box` as arrays.
+        sight: a `Sight`.
     """
-    c, v = camera_values, box_values
-    camera = Camera(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11], c[12])
-    box = Box(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7])
     height, width = marks.shape
     columns = (width + TILE - 1) // TILE
-    for again in range(2):
+    for fine in (False, True):
         for row in range(height):
             for column in range(width):
                 tile = (row // TILE) * columns + column // TILE
-                first, last = begins[tile], begins[tile + 1]
-                if (known and first == last) or (again == 1 and _smooth(marks, row, column)):
+                bare = known and sight.begins[tile] == sight.begins[tile + 1]
+                if bare or (fine and _smooth(marks, row, column)):
                     continue
-                fine, skip = again == 1, known and again == 0
-                mark = _paint(
-                    image, row, column, fine, skip, camera, box, shapes, geometry, items, first, last, depths, layers
-                )
-                if again == 0 and mark != _EMPTY:
+                mark = _paint(sight, tile, image, row, column, fine, known and not fine)
+                if not fine and mark != _EMPTY:
                     marks[row, column] = mark
+
+
+class Canvas:
+    """Makes pictures of one size; from a camera that stands still it keeps the picture without shapes.
+
+    Args:
+        size: width and height, pixels.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """Know nothing yet."""
+        self.size = size
+        self._place: tuple[Camera, Box] | None = None
+        self._still: tuple[NDArray[np.uint8], NDArray[np.int64]] | None = None
+
+    def picture(self, shapes: NDArray[np.float64], pose: Pose, box: Box) -> NDArray[np.uint8]:
+        """Return a new picture (height, width, 3), the same whether or not one from there has been made before.
+
+        Args:
+            shapes: (n, len(SHAPE_FIELDS)), m, and colours from 0 to 1.
+            pose: the camera.
+            box: the world.
+        """
+        place = Camera(*(tuple(axis.tolist()) for axis in pose[:4]), pose.pixel(self.size[1])), box
+        if place != self._place:
+            self._place, self._still = place, None
+        elif self._still is None:  # worth it from the second picture on
+            self._still = self._blank()
+            cast(*self._still, False, self._sight(shapes[:0], pose, place))
+        image, marks = (part.copy() for part in self._still or self._blank())
+        cast(image, marks, self._still is not None, self._sight(shapes, pose, place))
+        return image
+
+    def _blank(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Return an empty picture and what its pixels see."""
+        width, height = self.size
+        return np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64)
+
+    def _sight(self, shapes: NDArray[np.float64], pose: Pose, place: tuple[Camera, Box]) -> Sight:
+        """Work out what the ray caster needs to know beforehand."""
+        ends = np.stack((shapes[:, 1:4], np.where(shapes[:, :1] == CAPSULE, shapes[:, 4:7], shapes[:, 1:4])), axis=1)
+        tiles = _sort_into_tiles(outlines(pose, ends, shapes[:, 7], self.size, TILE), self.size)
+        layers = np.empty(_LAYERS), np.empty(_LAYERS, np.int64)
+        return Sight(*place, shapes, _prepare(shapes, pose.eye), *tiles, *layers)
+
+
+def _prepare(shapes: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Work out what is the same for every ray from an eye (3,) in m.
+
+    Returns:
+        (n, 9): 0-2 from a to the eye; 3-5 from a to b of a capsule, b itself of a disc; 6 that one squared; 7 its
+        product with the first; 8 the first squared less the radius squared.
+    """
+    offset, other = eye - shapes[:, 1:4], shapes[:, 4:7] - np.where(shapes[:, :1] == CAPSULE, shapes[:, 1:4], 0.0)
+    squares = [(other * other).sum(axis=1), (other * offset).sum(axis=1), (offset * offset).sum(axis=1)]
+    squares[2] -= shapes[:, 7] ** 2
+    return np.ascontiguousarray(np.column_stack((offset, other, *squares)))
+
+
+def _sort_into_tiles(outlines: NDArray[np.int64], size: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which shapes each tile of a picture has to look for.
+
+    Args:
+        outlines: (n, 4) first column and row, last column and row of the tiles each shape can reach, last excluded.
+        size: width and height of the picture, pixels.
+
+    Returns:
+        (tiles + 1,) where each tile's shapes begin in the second, and (m,) shapes, tile by tile.
+    """
+    columns, rows = (-(-pixels // TILE) for pixels in size)
+    wide, high = outlines[:, 2] - outlines[:, 0], outlines[:, 3] - outlines[:, 1]
+    counts = wide * high
+    items = np.repeat(np.arange(len(outlines)), counts)
+    place = np.arange(len(items)) - np.repeat(np.cumsum(counts) - counts, counts)
+    column = outlines[items, 0] + place % wide[items]
+    tile = (outlines[items, 1] + place // wide[items]) * columns + column
+    order = np.argsort(tile, kind="stable")
+    return np.searchsorted(tile[order], np.arange(columns * rows + 1)), items[order]

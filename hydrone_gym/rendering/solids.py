@@ -4,6 +4,7 @@ import math
 
 from hydrone_gym._jit import inlined
 from hydrone_gym.rendering.backdrop import mix
+from hydrone_gym.surface import is_air
 
 # dark and light: the colour turned from and to the sun; opacity below 1: glass; foam 1: a bright line at the waterline
 SHAPE_FIELDS = (
@@ -74,9 +75,9 @@ def _foam(s, z, t, camera):
 def solid(s, g, d, t, camera):
     """Colour of an opaque shape where a ray meets it, and which part of the shape that is."""
     n = _normal(s, g, d, t)
-    z = camera.ez + t * d[2]
+    z = camera.eye[2] + t * d[2]
     lit = 0.08 + 0.62 * max(0.0, _dot(n, _LIGHT)) + 0.30 * (0.5 + 0.5 * n[2])
-    lit = lit * math.exp(0.07 * z) if z < 0.0 else lit
+    lit = lit if is_air(z) else lit * math.exp(0.07 * z)
     # a disc has a rim, so that it is seen against anything
     x, y, w = g[0] + t * d[0], g[1] + t * d[1], g[2] + t * d[2]
     rim = s[0] == DISC and x * x + y * y + w * w > 0.72 * s[7] * s[7]
@@ -88,13 +89,13 @@ def solid(s, g, d, t, camera):
 def glass(s, g, d, t, camera, box):
     """Colour and opacity of a translucent shape: glass is clear in the middle, denser at its rim."""
     if s[0] == SHADOW:
-        x, y = camera.ex + t * d[0], camera.ey + t * d[1]
+        x, y = camera.eye[0] + t * d[0], camera.eye[1] + t * d[1]
         fall = math.sqrt((x - s[1]) ** 2 + (y - s[2]) ** 2) / s[7]
-        ground = box.sea > 0.0 or (box.x0 < x and x < box.x1 and box.y0 < y and y < box.y1)
+        ground = box.sea > 0.0 or (box.lower[0] < x and x < box.upper[0] and box.lower[1] < y and y < box.upper[1])
         return (s[8], s[9], s[10]), s[14] * min(1.0, 2.2 - 2.2 * fall) if ground else 0.0
     n = _normal(s, g, d, t)
     rim = 1.0 + _dot(n, d)
-    foam = _foam(s, camera.ez + t * d[2], t, camera)
+    foam = _foam(s, camera.eye[2] + t * d[2], t, camera)
     colour = mix((s[11], s[12], s[13]), (s[8], s[9], s[10]), min(1.0, rim * rim * 1.3))
     colour = mix(colour, (1.0, 1.0, 1.0), max(foam, 0.125 + 0.125 * _dot(n, _LIGHT)))
     return colour, max(0.6 * foam, s[14] * (0.28 + 0.72 * rim * rim))

@@ -155,7 +155,7 @@ def test_looking_only_in_the_tiles_of_an_outline_misses_nothing(camera, monkeypa
     image = paint(shown, camera)
     everywhere = np.array([0, 0, -(-SIZE[0] // raycast.TILE), -(-SIZE[1] // raycast.TILE)])
     monkeypatch.setattr(
-        "hydrone_gym.rendering.canvas.outlines", lambda pose, ends, *_: np.tile(everywhere, (len(ends), 1))
+        "hydrone_gym.rendering.raycast.outlines", lambda pose, ends, *_: np.tile(everywhere, (len(ends), 1))
     )
     np.testing.assert_array_equal(paint(shown, camera), image)
 
