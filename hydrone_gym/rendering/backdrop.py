@@ -19,13 +19,14 @@ Point = tuple[float, float, float]
 
 
 class Camera(NamedTuple):
-    """Where the eye is (m), unit vectors to the right, up and forward, and one pixel's width at distance 1."""
+    """Where the eye is (m), unit vectors to the right, up and forward, one pixel's width at distance 1, the middle pixel."""
 
     eye: Point
     right: Point
     up: Point
     forward: Point
     pixel: float
+    middle: tuple[float, float]
 
 
 class Box(NamedTuple):
@@ -119,19 +120,15 @@ def _off_lines(value, low, high):
 
 
 @inlined
-def _sides(camera, axis):
-    """The parts of the camera's right and up along an axis."""
-    return camera.right[axis], camera.up[axis]
-
-
-@inlined
 def _level_lines(camera, box, span, d, t, half_width, blur):
     """Coverage by the grid's lines on a level plane."""
+    right, up = camera.right, camera.up
+    normal = right[2], up[2]
     x = _off_lines(camera.eye[0] + t * d[0], box.lower[0], box.upper[0])
     y = _off_lines(camera.eye[1] + t * d[1], box.lower[1], box.upper[1])
     return max(
-        _stroke(x, half_width, blur, t, camera, d[0] * span.by[2], _sides(camera, 0), _sides(camera, 2)),
-        _stroke(y, half_width, blur, t, camera, d[1] * span.by[2], _sides(camera, 1), _sides(camera, 2)),
+        _stroke(x, half_width, blur, t, camera, d[0] * span.by[2], (right[0], up[0]), normal),
+        _stroke(y, half_width, blur, t, camera, d[1] * span.by[2], (right[1], up[1]), normal),
     )
 
 
@@ -152,21 +149,24 @@ def _floor(camera, box, span, d, t):
 @inlined
 def _wall(camera, box, span, axis, d, t):
     """How strongly a wall of the box is drawn at a point: (grid, edges with the waterline, transition zone)."""
-    other = 1 - axis
-    z, along = camera.eye[2] + t * d[2], camera.eye[other] + t * d[other]
-    low, top = box.lower[other], box.upper[other]
-    flat, normal, upright = _sides(camera, other), _sides(camera, axis), _sides(camera, 2)
-    blur = t * camera.pixel * (1.0 + abs(span.by[axis]))
-    side, rise = d[other] * span.by[axis], d[2] * span.by[axis]
+    # the axis is spelled out, as a tuple that is looked up by a number leaves the registers
+    x, y = (camera.right[0], camera.up[0]), (camera.right[1], camera.up[1])
+    by, part, along, low, top = span.by[1], d[0], camera.eye[0] + t * d[0], box.lower[0], box.upper[0]
+    if axis == 0:
+        x, y = y, x
+        by, part, along, low, top = span.by[0], d[1], camera.eye[1] + t * d[1], box.lower[1], box.upper[1]
+    z, upright = camera.eye[2] + t * d[2], (camera.right[2], camera.up[2])
+    blur = t * camera.pixel * (1.0 + abs(by))
+    side, rise = part * by, d[2] * by
     grid = max(
-        _stroke(_off_lines(along, low, top), 0.035, blur, t, camera, side, flat, normal),
-        _stroke(_off_lines(z, box.lower[2], box.upper[2]), 0.035, blur, t, camera, rise, upright, normal),
+        _stroke(_off_lines(along, low, top), 0.035, blur, t, camera, side, x, y),
+        _stroke(_off_lines(z, box.lower[2], box.upper[2]), 0.035, blur, t, camera, rise, upright, y),
     )
     edge = max(
-        _stroke(min(abs(along - low), abs(along - top)), 0.05, blur, t, camera, side, flat, normal),
-        _stroke(abs(z), 0.05, blur, t, camera, rise, upright, normal),
+        _stroke(min(abs(along - low), abs(along - top)), 0.05, blur, t, camera, side, x, y),
+        _stroke(abs(z), 0.05, blur, t, camera, rise, upright, y),
     )
-    rim = _stroke(abs(abs(z) - box.zone), 0.03, blur, t, camera, rise, upright, normal)
+    rim = _stroke(abs(abs(z) - box.zone), 0.03, blur, t, camera, rise, upright, y)
     return grid, edge, max(0.35 if abs(z) < box.zone else 0.0, rim)
 
 

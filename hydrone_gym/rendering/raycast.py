@@ -7,7 +7,6 @@ for only in the tiles of the picture that it can reach, and a picture without sh
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.rendering.backdrop import Box, Camera, exit_colour, mix, near_wall, span_of, surface
 from hydrone_gym.rendering.camera import Pose, outlines
-from hydrone_gym.rendering.solids import CAPSULE, glass, meet, solid
+from hydrone_gym.rendering.solids import CAPSULE, OPACITY, glass, meet, prepare, solid
 
 TILE = 8  # pixels
 _LAYERS = 32  # translucent things kept along one ray, the nearest
@@ -41,55 +40,33 @@ def _drown(colour, length):
 
 
 @inlined
-def _keep(depths, layers, count, t, layer):
+def _keep(found, count, t, layer):
     """Put a translucent thing among those found, nearest first; return how many there are, the farthest given up."""
-    k = min(count, depths.size - 1)
-    if count == depths.size and depths[k] < t:
+    k = min(count, len(found) - 1)
+    if count == len(found) and found[k, 0] < t:
         return count
-    while k > 0 and depths[k - 1] > t:
-        depths[k], layers[k] = depths[k - 1], layers[k - 1]
+    while k > 0 and found[k - 1, 0] > t:
+        found[k, 0], found[k, 1] = found[k - 1, 0], found[k - 1, 1]
         k -= 1
-    depths[k], layers[k] = t, layer
-    return min(count + 1, depths.size)
-
-
-class Sight(NamedTuple):
-    """What all rays of a picture share.
-
-    Attributes:
-        camera, box: where it is taken from, and the world.
-        shapes: (n, len(SHAPE_FIELDS)) float64, m, and colours from 0 to 1.
-        geometry: (n, 9), what `_prepare` makes of them.
-        begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
-        depths, layers: (k,) float64 and int64, working storage: the most translucent things kept along one ray.
-    """
-
-    camera: Camera
-    box: Box
-    shapes: NDArray[np.float64]
-    geometry: NDArray[np.float64]
-    begins: NDArray[np.int64]
-    items: NDArray[np.int64]
-    depths: NDArray[np.float64]
-    layers: NDArray[np.int64]
+    found[k, 0], found[k, 1] = t, layer
+    return min(count + 1, len(found))
 
 
 @inlined
-def _trace(sight, tile, d, known):
+def _trace(place, shapes, items, tile, found, d, known):
     """Follow one ray, unless it meets no shape and what is there without shapes is known.
 
     Returns:
         Red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
     """
-    camera, box, shapes, geometry = sight.camera, sight.box, sight.shapes, sight.geometry
-    depths, layers = sight.depths, sight.layers
+    camera, box = place
     end, hit, count = math.inf, -1, 0
-    for k in range(sight.begins[tile], sight.begins[tile + 1]):
-        item = sight.items[k]
-        t = meet(shapes[item, 0], shapes[item, 7], geometry[item], d)
+    for k in range(tile[0], tile[1]):
+        item = items[k]
+        t = meet(shapes[item], d)
         if t > 0.0 and t < end:
-            if shapes[item, 14] < 1.0:
-                count = _keep(depths, layers, count, t, item)
+            if shapes[item, OPACITY] < 1.0:
+                count = _keep(found, count, t, item)
             else:
                 end, hit = t, item
     if known and hit < 0 and count == 0:
@@ -98,17 +75,17 @@ def _trace(sight, tile, d, known):
     inside = span.leave > max(span.enter, 0.0)
     waterline = -camera.eye[2] / d[2]
     if inside and waterline > 0.0 and span.enter <= waterline and waterline <= span.leave and waterline < end:
-        count = _keep(depths, layers, count, waterline, _SURFACE)
+        count = _keep(found, count, waterline, _SURFACE)
     if inside and span.enter > 0.0 and span.enter_axis < 2 and span.enter < end:
-        count = _keep(depths, layers, count, span.enter, _NEAR_WALL)
+        count = _keep(found, count, span.enter, _NEAR_WALL)
     mark = hit * 64 + span.leave_axis + 8 * inside
     if hit >= 0:
-        colour, part = solid(shapes[hit], geometry[hit], d, end, camera)
+        colour, part = solid(shapes[hit], d, end, camera)
         mark += part
     else:
         colour = exit_colour(camera, box, span, d)
     for i in range(count - 1, -1, -1):
-        t, layer = depths[i], layers[i]
+        t, layer = found[i, 0], int(found[i, 1])
         if t < end:
             colour = _drown(colour, min(end, span.rise) - max(t, span.dive))
             if layer == _SURFACE:
@@ -116,7 +93,7 @@ def _trace(sight, tile, d, known):
             elif layer == _NEAR_WALL:
                 paint, opacity = near_wall(camera, box, span, d)
             else:
-                paint, opacity = glass(shapes[layer], geometry[layer], d, t, camera, box)
+                paint, opacity = glass(shapes[layer], d, t, camera, box)
             colour = mix(colour, paint, opacity)
             end = t
             mark = mark * 31 + layer
@@ -125,13 +102,13 @@ def _trace(sight, tile, d, known):
 
 
 @inlined
-def _ray(camera, column, row, width, height):
+def _ray(camera, column, row):
     """Unit direction through a point of the image, in pixels from its upper left corner."""
-    u = (column - 0.5 * width) * camera.pixel
-    v = (0.5 * height - row) * camera.pixel
-    x = camera.forward[0] + u * camera.right[0] + v * camera.up[0]
-    y = camera.forward[1] + u * camera.right[1] + v * camera.up[1]
-    z = camera.forward[2] + u * camera.right[2] + v * camera.up[2]
+    u, v = (column - camera.middle[0]) * camera.pixel, (camera.middle[1] - row) * camera.pixel
+    right, up, forward = camera.right, camera.up, camera.forward
+    x = forward[0] + u * right[0] + v * up[0]
+    y = forward[1] + u * right[1] + v * up[1]
+    z = forward[2] + u * right[2] + v * up[2]
     scale = 1.0 / math.sqrt(1.0 + u * u + v * v)
     return x * scale, y * scale, z * scale
 
@@ -155,43 +132,46 @@ def _smooth(marks, row, column):
 
 
 @inlined
-def _paint(sight, tile, image, row, column, fine, known):
-    """Paint one pixel with one ray, or with four if fine; return the mark of its last ray."""
+def _look(place, shapes, items, tile, found, pixel, fine, known):
+    """Colour of a pixel from one ray, or from four if fine, 0 to 1, and the mark of its last ray."""
     red, green, blue, mark = 0.0, 0.0, 0.0, 0
     rays = 4 if fine else 1
     for k in range(rays):
-        x = column + 0.5 + (_CORNERS[k][0] if fine else 0.0)
-        y = row + 0.5 + (_CORNERS[k][1] if fine else 0.0)
-        r, g, b, mark = _trace(sight, tile, _ray(sight.camera, x, y, image.shape[1], image.shape[0]), known)
+        x = pixel[0] + 0.5 + (_CORNERS[k][0] if fine else 0.0)
+        y = pixel[1] + 0.5 + (_CORNERS[k][1] if fine else 0.0)
+        r, g, b, mark = _trace(place, shapes, items, tile, found, _ray(place[0], x, y), known)
         red, green, blue = red + r, green + g, blue + b
-    if mark != _EMPTY:
-        image[row, column, 0] = _byte(red / rays)
-        image[row, column, 1] = _byte(green / rays)
-        image[row, column, 2] = _byte(blue / rays)
-    return mark
+    return (red / rays, green / rays, blue / rays), mark
 
 
 @kernel
-def cast(image, marks, known, sight):
+def cast(image, marks, known, place, shapes, begins, items, found):
     """Paint a picture.
 
     Args:
         image: (height, width, 3) uint8, written.
         marks: (height, width) int64, what each pixel sees, written.
         known: whether image and marks hold the picture without shapes; the result is the same.
-        sight: a `Sight`.
+        place: a `Camera` and a `Box`.
+        shapes: float64, from `prepare`.
+        begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
+        found: (k, 2) float64, working storage: the most translucent things kept along one ray.
     """
     height, width = marks.shape
     columns = (width + TILE - 1) // TILE
     for fine in (False, True):
         for row in range(height):
             for column in range(width):
-                tile = (row // TILE) * columns + column // TILE
-                bare = known and sight.begins[tile] == sight.begins[tile + 1]
-                if bare or (fine and _smooth(marks, row, column)):
+                number = (row // TILE) * columns + column // TILE
+                tile = begins[number], begins[number + 1]
+                if (known and tile[0] == tile[1]) or (fine and _smooth(marks, row, column)):
                     continue
-                mark = _paint(sight, tile, image, row, column, fine, known and not fine)
-                if not fine and mark != _EMPTY:
+                colour, mark = _look(place, shapes, items, tile, found, (column, row), fine, known and not fine)
+                if mark == _EMPTY:
+                    continue
+                for k in range(3):
+                    image[row, column, k] = _byte(colour[k])
+                if not fine:
                     marks[row, column] = mark
 
 
@@ -216,14 +196,16 @@ class Canvas:
             pose: the camera.
             box: the world.
         """
-        place = Camera(*(tuple(axis.tolist()) for axis in pose[:4]), pose.pixel(self.size[1])), box
+        width, height = self.size
+        axes = (tuple(axis.tolist()) for axis in pose[:4])
+        place = Camera(*axes, pose.pixel(height), (0.5 * width, 0.5 * height)), box
         if place != self._place:
             self._place, self._still = place, None
         elif self._still is None:  # worth it from the second picture on
             self._still = self._blank()
-            cast(*self._still, False, self._sight(shapes[:0], pose, place))
+            self._cast(*self._still, False, shapes[:0], pose)
         image, marks = (part.copy() for part in self._still or self._blank())
-        cast(image, marks, self._still is not None, self._sight(shapes, pose, place))
+        self._cast(image, marks, self._still is not None, shapes, pose)
         return image
 
     def _blank(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
@@ -231,25 +213,13 @@ class Canvas:
         width, height = self.size
         return np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64)
 
-    def _sight(self, shapes: NDArray[np.float64], pose: Pose, place: tuple[Camera, Box]) -> Sight:
-        """Work out what the ray caster needs to know beforehand."""
+    def _cast(
+        self, image: NDArray[np.uint8], marks: NDArray[np.int64], known: bool, shapes: NDArray[np.float64], pose: Pose
+    ) -> None:
+        """Paint a picture, over the one without shapes if that is known."""
         ends = np.stack((shapes[:, 1:4], np.where(shapes[:, :1] == CAPSULE, shapes[:, 4:7], shapes[:, 1:4])), axis=1)
         tiles = _sort_into_tiles(outlines(pose, ends, shapes[:, 7], self.size, TILE), self.size)
-        layers = np.empty(_LAYERS), np.empty(_LAYERS, np.int64)
-        return Sight(*place, shapes, _prepare(shapes, pose.eye), *tiles, *layers)
-
-
-def _prepare(shapes: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Work out what is the same for every ray from an eye (3,) in m.
-
-    Returns:
-        (n, 9): 0-2 from a to the eye; 3-5 from a to b of a capsule, b itself of a disc; 6 that one squared; 7 its
-        product with the first; 8 the first squared less the radius squared.
-    """
-    offset, other = eye - shapes[:, 1:4], shapes[:, 4:7] - np.where(shapes[:, :1] == CAPSULE, shapes[:, 1:4], 0.0)
-    squares = [(other * other).sum(axis=1), (other * offset).sum(axis=1), (offset * offset).sum(axis=1)]
-    squares[2] -= shapes[:, 7] ** 2
-    return np.ascontiguousarray(np.column_stack((offset, other, *squares)))
+        cast(image, marks, known, self._place, prepare(shapes, pose.eye), *tiles, np.empty((_LAYERS, 2)))
 
 
 def _sort_into_tiles(outlines: NDArray[np.int64], size: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

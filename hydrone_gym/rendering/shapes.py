@@ -6,10 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import Pose
-from hydrone_gym.rendering.solids import CAPSULE, DISC, SHADOW, SHAPE_FIELDS, SPHERE
+from hydrone_gym.rendering.solids import CAPSULE, DISC, OPACITY, SHADOW, SHAPE_FIELDS, SPHERE
 
 Shapes = NDArray[np.float64]  # (n, len(SHAPE_FIELDS))
-_OPACITY = SHAPE_FIELDS.index("opacity")
 _BLACK = ("#101010", "#4a4a4a")
 _WHITE = ("#e8e8e8", "#ffffff")
 _PATH = ("#8f3d00", "#ff7a1a")
@@ -49,7 +48,7 @@ def _rows(
 def spheres(obstacles: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
     """Obstacles (M, 4) x, y, z, r in m: dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
     rows = _rows(SPHERE, obstacles[:, :3], 0.0, obstacles[:, 3], style.DETECTED, foam=1.0)
-    rows[detected & veiled, _OPACITY] = 0.7
+    rows[detected & veiled, OPACITY] = 0.7
     hidden = _rows(SPHERE, obstacles[~detected, :3], 0.0, obstacles[~detected, 3], style.GLASS, opacity=0.8, foam=1.0)
     rows[~detected] = hidden
     return rows
