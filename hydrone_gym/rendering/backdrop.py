@@ -19,14 +19,14 @@ Point = tuple[float, float, float]
 
 
 class Camera(NamedTuple):
-    """Where the eye is (m), unit vectors to the right, up and forward, one pixel's width at distance 1, the middle pixel."""
+    """Where the eye is (m), and unit vectors to the right, up and forward."""
 
     eye: Point
     right: Point
     up: Point
     forward: Point
-    pixel: float
-    middle: tuple[float, float]
+    pixel: float  # width of one at distance 1
+    middle: tuple[float, float]  # of the picture, pixels
 
 
 class Box(NamedTuple):
@@ -149,7 +149,6 @@ def _floor(camera, box, span, d, t):
 @inlined
 def _wall(camera, box, span, axis, d, t):
     """How strongly a wall of the box is drawn at a point: (grid, edges with the waterline, transition zone)."""
-    # the axis is spelled out, as a tuple that is looked up by a number leaves the registers
     x, y = (camera.right[0], camera.up[0]), (camera.right[1], camera.up[1])
     by, part, along, low, top = span.by[1], d[0], camera.eye[0] + t * d[0], box.lower[0], box.upper[0]
     if axis == 0:

@@ -1,15 +1,56 @@
-"""Where a picture is taken from, and which part of it a shape can reach."""
+"""Where a picture is taken from and how large it is, and which part of it a shape can reach."""
 
-from typing import NamedTuple
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym.world.world import World
+
+CAMERAS = ("overview", "chase")
+LEAST, MOST = 64, 4096  # pixels
+ELEVATION = 20.0  # degrees, of cameras that see the whole box
 FIELD_OF_VIEW = 32.0  # degrees, over the height of the picture
 CHASE_FIELD = 50.0
 _BACK, _ABOVE, _AHEAD = 5.0, 2.3, 1.0  # m: where the chase camera is, and how far before the vehicle it looks
 _TICKS_REMEMBERED = 0.033  # share by which a move counts less with every tick since: half of it after 1 s
 _MARGIN = 0.97  # of the picture that the box may fill
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """What a picture is like; see the docstring of `HydroneEnv`.
+
+    Attributes:
+        size: width and height, pixels; even, as video codecs demand.
+        camera: "overview" or "chase".
+
+    Raises:
+        ValueError: a value out of range, naming the option, its rule and the value.
+    """
+
+    size: tuple[int, int] = (640, 480)
+    camera: str = "overview"
+
+    def __post_init__(self) -> None:
+        """Check every option."""
+        if self.camera not in CAMERAS:
+            raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
+        if not _is_size(self.size):
+            raise ValueError(
+                f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels), got {self.size!r}"
+            )
+        object.__setattr__(self, "size", tuple(map(int, self.size)))
+
+
+def _is_size(size: Any) -> bool:
+    """Whether something is a width and a height."""
+    if not isinstance(size, tuple | list) or len(size) != 2:
+        return False
+    return all(isinstance(n, int) and not isinstance(n, bool) and LEAST <= n <= MOST and n % 2 == 0 for n in size)
 
 
 class Pose(NamedTuple):
@@ -59,6 +100,17 @@ def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, asp
     back = max((high - low) / (2.0 * k) for high, low, k in spans)
     across, upward = (0.5 * (high + low) for high, low, _ in spans)
     return pose._replace(eye=across * pose.right + upward * pose.up - back * pose.forward)
+
+
+def side_azimuth(start: Sequence[float], goal: Sequence[float]) -> float:
+    """Return the azimuth (degrees) from which the way from start to goal (m) is seen from the side."""
+    return float(np.degrees(np.arctan2(goal[1] - start[1], goal[0] - start[0]))) - 75.0
+
+
+def beside(world: World, start: Sequence[float], goal: Sequence[float], aspect: float) -> Pose:
+    """Return the camera that sees the whole box from the side of the way from start to goal (m)."""
+    corners = np.array(list(itertools.product(*zip(world.lower, world.upper, strict=True))))
+    return overview(corners, side_azimuth(start, goal), ELEVATION, aspect)
 
 
 def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:

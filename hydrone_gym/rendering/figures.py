@@ -6,7 +6,6 @@ imported when the first figure is drawn, and no display is needed.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.scene3d import Scene, split_at_surface
+from hydrone_gym.rendering.camera import side_azimuth
+from hydrone_gym.rendering.paths import crossing_points, dash, split_media
+from hydrone_gym.rendering.scene3d import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,11 +25,6 @@ LOWER = (-10.0, -10.0, -5.0)  # m: the box of the paper's experiments
 UPPER = (10.0, 10.0, 10.0)
 FORMATS = ("png", "pdf")
 _DASH, _GAP = 0.3, 0.21  # m: a path under water
-
-
-def camera_azimuth(start: Sequence[float], goal: Sequence[float]) -> float:
-    """Return the azimuth (degrees) from which the way from start to goal (m) is seen from the side."""
-    return float(np.degrees(np.arctan2(goal[1] - start[1], goal[0] - start[0]))) - 75.0
 
 
 def plot_path(
@@ -46,13 +42,13 @@ def plot_path(
     Args:
         positions: (N, 3) m, in order of time; solid in air, dashed under water.
         goal: (3,) m.
-        detected, undetected: (k, 4) spheres x, y, z, r in m, black and faint.
+        detected, undetected: (k, BODY) obstacles, black and faint.
         lower, upper: corners of the world, m.
         title: shown above.
     """
-    scene = Scene(lower, upper, azimuth=camera_azimuth(positions[0], goal))
-    scene.spheres(undetected, style.FAINT, alpha=0.55)
-    scene.spheres(detected, style.DETECTED)
+    scene = Scene(lower, upper, azimuth=side_azimuth(positions[0], goal))
+    scene.obstacles(undetected, style.FAINT, alpha=0.55)
+    scene.obstacles(detected, style.DETECTED)
     air, water = split_media(positions)
     scene.lines(air, style.RED, 2.8, hidden=0.5)
     scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
@@ -83,7 +79,7 @@ def plot_tree(
         edges: (E, K, 3) the points of each edge, m, K at least 2.
         in_air: (E,) True for edges in air (red), False for edges under water (purple).
         start, goal: (3,) m, black dot and purple cross.
-        obstacles: (M, 4) spheres x, y, z, r in m.
+        obstacles: (M, BODY).
         solution: (N, 3) the chosen path, m, if any.
         lower, upper: corners of the world, m.
         title: shown above.
@@ -94,8 +90,8 @@ def plot_tree(
     edges, in_air = np.asarray(edges, dtype=np.float64), np.asarray(in_air, dtype=bool)
     if edges.ndim != 3 or edges.shape[1] < 2 or edges.shape[2] != 3 or in_air.shape != edges.shape[:1]:
         raise ValueError(f"edges must be (E, K, 3) with K >= 2 and in_air (E,), got {edges.shape} and {in_air.shape}")
-    scene = Scene(lower, upper, azimuth=camera_azimuth(start, goal))
-    scene.spheres(obstacles, style.DETECTED)
+    scene = Scene(lower, upper, azimuth=side_azimuth(start, goal))
+    scene.obstacles(obstacles, style.DETECTED)
     if solution is not None:  # beneath the branches, which keep their colour
         scene.lines([np.asarray(solution)], style.BLACK, 4.5, lower=2)
     scene.lines(list(edges[in_air]), style.RED, 1.3)
@@ -124,44 +120,6 @@ def save_figure(figure: Figure, path: str | Path) -> list[Path]:
             metadata={"CreationDate": None} if target.suffix == ".pdf" else None,
         )
     return written
-
-
-def split_media(positions: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Cut a path (N, 3) at the surface into its parts in air and its parts under water."""
-    line = split_at_surface(np.asarray(positions, dtype=np.float64))
-    wet = line[:-1, 2] + line[1:, 2] < 0.0
-    cuts = [0, *(np.flatnonzero(wet[1:] != wet[:-1]) + 1).tolist(), len(line) - 1]
-    parts: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
-    for first, last in itertools.pairwise(cuts):
-        if last > first:
-            parts[int(wet[first])].append(line[first : last + 1])
-    return parts
-
-
-def crossing_points(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return where a path (N, 3) crosses z = 0, (c, 3), interpolated between samples."""
-    z = np.asarray(positions)[:, 2]
-    # the medium of a sample on the surface is water, as in the model
-    first = np.flatnonzero((z[:-1] > 0.0) != (z[1:] > 0.0))
-    share = (z[first] / (z[first] - z[first + 1]))[:, None]
-    points = positions[first] + share * (positions[first + 1] - positions[first])
-    points[:, 2] = 0.0
-    return points
-
-
-def dash(line: NDArray[np.float64], length: float, gap: float) -> list[NDArray[np.float64]]:
-    """Cut dashes of a length out of a polyline (n, 3), a gap apart, all in m along the line.
-
-    A dash pattern of Matplotlib would restart in every piece of the scene.
-    """
-    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
-    dashes = []
-    for begin in np.arange(0.0, along[-1], length + gap):
-        end = min(begin + length, along[-1])
-        inside = along[(along > begin) & (along < end)]
-        samples = np.concatenate(([begin], inside, [end]))
-        dashes.append(np.column_stack([np.interp(samples, along, line[:, axis]) for axis in range(3)]))
-    return dashes
 
 
 def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, Any]]]) -> None:

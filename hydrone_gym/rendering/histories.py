@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.rendering import style
+from hydrone_gym.surface import in_air
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,11 +112,11 @@ def _finish(
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    air = heights > 0.0
+    shade: dict[str, Any] = {"color": style.WATER, "alpha": 0.22, "linewidth": 0}
+    air, inside = in_air(heights), np.abs(heights) <= zone
     crossings = times[1:][air[1:] != air[:-1]]
     for panel in panels:
-        for begin, end in _spans(times, np.abs(heights) <= zone):
-            panel.axvspan(begin, end, color=style.WATER, alpha=0.22, linewidth=0)
+        panel.fill_between(times, 0.0, 1.0, inside, transform=panel.get_xaxis_transform(), **shade)
         for time in crossings:
             panel.axvline(time, color=style.BLUE, linewidth=1.2, linestyle="--")
     panels[-1].set_xlabel("time (s)")
@@ -130,10 +131,3 @@ def _finish(
         handles.append(Line2D([], [], color=style.BLUE, linewidth=1.2, linestyle="--", label="crossing"))
     with rc_context(style.FONTS):
         figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
-
-
-def _spans(times: NDArray[np.float64], inside: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Return the (begin, end) of each run of True, s."""
-    edges = np.diff(np.concatenate(([0], inside.astype(int), [0])))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    return [(float(times[first]), float(times[last])) for first, last in zip(begins, ends, strict=True)]

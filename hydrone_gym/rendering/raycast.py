@@ -7,6 +7,7 @@ for only in the tiles of the picture that it can reach, and a picture without sh
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,14 +198,15 @@ class Canvas:
             box: the world.
         """
         width, height = self.size
-        axes = (tuple(axis.tolist()) for axis in pose[:4])
+        axes: list[Any] = [tuple(axis.tolist()) for axis in pose[:4]]
         place = Camera(*axes, pose.pixel(height), (0.5 * width, 0.5 * height)), box
         if place != self._place:
             self._place, self._still = place, None
         elif self._still is None:  # worth it from the second picture on
             self._still = self._blank()
             self._cast(*self._still, False, shapes[:0], pose)
-        image, marks = (part.copy() for part in self._still or self._blank())
+        still, seen = self._still or self._blank()
+        image, marks = still.copy(), seen.copy()
         self._cast(image, marks, self._still is not None, shapes, pose)
         return image
 

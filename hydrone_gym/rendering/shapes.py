@@ -6,7 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import Pose
+from hydrone_gym.rendering.paths import along
 from hydrone_gym.rendering.solids import CAPSULE, DISC, OPACITY, SHADOW, SHAPE_FIELDS, SPHERE
+from hydrone_gym.surface import in_air
+from hydrone_gym.world.bodies import placed
 
 Shapes = NDArray[np.float64]  # (n, len(SHAPE_FIELDS))
 _BLACK = ("#101010", "#4a4a4a")
@@ -19,12 +22,6 @@ _REAR = ("#10283a", "#f4f7fa")
 _SHADE = ("#0a2238", "#0a2238")
 _HAIR = 0.005  # m: a shadow lies on its ground
 _PLUMB = ("#4f6475", "#6d8596")
-
-
-def rgb(colour: str) -> tuple[float, float, float]:
-    """Return the parts of a colour "#rrggbb", from 0 to 1."""
-    red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    return red, green, blue
 
 
 def _rows(
@@ -40,18 +37,18 @@ def _rows(
     first = np.atleast_2d(np.asarray(a, dtype=np.float64))
     rows = np.empty((len(first), len(SHAPE_FIELDS)))
     rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7] = kind, first, b, radius
-    rows[:, 8:11], rows[:, 11:14] = rgb(colours[0]), rgb(colours[1])
+    rows[:, 8:11], rows[:, 11:14] = style.rgb(colours[0]), style.rgb(colours[1])
     rows[:, 14], rows[:, 15] = opacity, foam
     return rows
 
 
-def spheres(obstacles: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
-    """Obstacles (M, 4) x, y, z, r in m: dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
-    rows = _rows(SPHERE, obstacles[:, :3], 0.0, obstacles[:, 3], style.DETECTED, foam=1.0)
+def obstacles(bodies: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
+    """Obstacles (M, BODY): dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
+    middles, radii = placed(bodies)
+    rows = _rows(SPHERE, middles, 0.0, radii, style.DETECTED, foam=1.0)
+    glass = _rows(SPHERE, middles, 0.0, radii, style.GLASS, opacity=0.8, foam=1.0)
     rows[detected & veiled, OPACITY] = 0.7
-    hidden = _rows(SPHERE, obstacles[~detected, :3], 0.0, obstacles[~detected, 3], style.GLASS, opacity=0.8, foam=1.0)
-    rows[~detected] = hidden
-    return rows
+    return np.where(detected[:, None], rows, glass)
 
 
 def vehicle(state: NDArray[np.float64], arm: float, scale: float) -> Shapes:
@@ -88,7 +85,7 @@ def vehicle(state: NDArray[np.float64], arm: float, scale: float) -> Shapes:
 
 def shadow(position: NDArray[np.float64], floor: float, radius: float) -> Shapes:
     """The vehicle's shadow on what is below it, water or floor (at z = `floor`), wider and fainter from high above."""
-    ground = 0.0 if position[2] > 0.0 else floor
+    ground = 0.0 if in_air(position[2]) else floor
     height = max(position[2] - ground, 0.0)
     below = np.array([position[0], position[1], ground + _HAIR])
     return _rows(SHADOW, below, (0.0, 0.0, 1.0), radius * (1.0 + 0.06 * height), _SHADE, 0.5 / (1.0 + 0.08 * height))
@@ -96,9 +93,8 @@ def shadow(position: NDArray[np.float64], floor: float, radius: float) -> Shapes
 
 def path(points: NDArray[np.float64], radius: float) -> Shapes:
     """The flown path (N, 3) as a tube, with a ball at its start."""
-    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
     # one point a stretch, counted from the start, so that the tube does not shimmer as the path grows
-    steps = np.floor(along / (2.0 * radius)).astype(np.int64)
+    steps = np.floor(along(points) / (2.0 * radius)).astype(np.int64)
     new = np.diff(steps, prepend=-1) > 0
     new[-1] = True
     chosen = points[new]

@@ -5,44 +5,29 @@ before it is not drawn at all. So every translucent node has its origin in its m
 of its own, and unknown obstacles are two: those under water, in its middle, and those in the air.
 """
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.caption import describe
+from hydrone_gym.rendering.frame import describe
 from hydrone_gym.rendering.meshes import Mesh, ball, slab, vehicle, walls
-from hydrone_gym.rendering.moment import Moment
-from hydrone_gym.rendering.shapes import rgb
+from hydrone_gym.rendering.track import Moment, Tree
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.surface import in_air
+from hydrone_gym.world.bodies import UNIT, mesh, placed
 from hydrone_gym.world.world import World
 
 VEHICLE_SCALE = 3.0  # times its true size
 GRID = 5.0  # m between the lines on the floor
 UNKNOWN, DETECTED = style.GLASS[0], "#2b2b2b"
 _SAND, _LINES, _ARM, _ROTOR = "#ded0ad", "#8b98a5", "#10283a", "#9fb2c2"
-_GONE = 1e-6  # scale of a sphere that is not there; 0 would leave it without normals
+_GONE = 1e-6  # scale of an obstacle that is not there; 0 would leave it without normals
 _CHUNK = 20  # ticks of the path in one node: only the last one is sent anew at every tick
 _FINE = 128.0  # steps a metre in the vertices of trees: round numbers make small pages
 _GLASS = 0.5  # opacity
-
-
-class Tree(Protocol):
-    """A planner's tree in one period, such as `planners.TreeView`."""
-
-    @property
-    def edges(self) -> NDArray[np.float64]:
-        """References at both ends of each edge, (E, 2, 3) in m."""
-
-    @property
-    def air(self) -> NDArray[np.bool_]:
-        """Whether an edge ends in air, (E,)."""
-
-    @property
-    def path(self) -> NDArray[np.intp]:
-        """Edges of the path that is followed, in order."""
 
 
 class Stage:
@@ -57,7 +42,7 @@ class Stage:
     def __init__(self, scene: Any, moment: Moment, simulation: Simulation) -> None:
         """Add everything that stands still, and what moves where it begins."""
         self._scene, self._world = scene, simulation.world
-        self._obstacles = moment.obstacles
+        self._middles, self._sizes = placed(moment.obstacles)
         self._vehicle = self._add_vehicle(simulation.vehicle.arm * VEHICLE_SCALE)
         self._reference = self._mesh("/reference", ball(0.14, rings=8), style.BLACK)
         (x0, y0, bottom), (x1, y1, top) = simulation.world.lower, simulation.world.upper
@@ -70,11 +55,11 @@ class Stage:
         self._add_marks(moment, simulation.world)
         self._add_box(simulation.world)
         self._add_water(simulation.world)
-        wet = moment.obstacles[:, 2] < 0.0
-        self._known = [self._spheres("/obstacles/detected", np.ones(len(wet), bool), DETECTED)]
+        dry = in_air(self._middles[:, 2])
+        self._known = [self._bodies("/obstacles/detected", np.ones(len(dry), bool), DETECTED)]
         self._unknown = [
-            self._spheres("/obstacles/unknown, under water", wet, UNKNOWN, (x, y, 0.5 * bottom)),
-            self._spheres("/obstacles/unknown, in the air", ~wet, UNKNOWN, (x, y, 0.5 * top)),
+            self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom)),
+            self._bodies("/obstacles/unknown, in the air", dry, UNKNOWN, (x, y, 0.5 * top)),
         ]
 
     def show(self, moment: Moment) -> None:
@@ -87,10 +72,10 @@ class Stage:
         self._label.text = ", ".join(describe(moment.time, state[2], self._world.zone, moment.outcome)[0].split("   "))
         self._grow(moment.ticks[:, :3])
         for group, there in ((self._known, moment.detected), (self._unknown, ~moment.detected)):
-            scales = np.where(there, self._obstacles[:, 3], _GONE).astype(np.float32)
-            for spheres, chosen in group:
-                if spheres is not None:
-                    spheres.batched_scales = scales[chosen]
+            scales = np.where(there, self._sizes, _GONE).astype(np.float32)
+            for bodies, chosen in group:
+                if bodies is not None:
+                    bodies.batched_scales = scales[chosen]
 
     def plan(self, tree: Tree) -> None:
         """Show the tree of a period, and the path in it."""
@@ -126,12 +111,12 @@ class Stage:
         """Add the vehicle; return the frame it moves with."""
         frame = self._scene.add_frame("/vehicle", show_axes=False)
         parts = vehicle(arm)
-        for name, mesh, colour in (
+        for name, part, colour in (
             ("frame", parts.frame, _ARM),
             ("front", parts.front, style.RED),
             ("rotors", parts.rotors, _ROTOR),
         ):
-            self._mesh(f"/vehicle/{name}", mesh, colour)
+            self._mesh(f"/vehicle/{name}", part, colour)
         return frame
 
     def _add_marks(self, moment: Moment, world: World) -> None:
@@ -165,7 +150,7 @@ class Stage:
             for k, wall in enumerate(walls(lower, upper, low, high)):
                 self._mesh(f"/{name} {k}", wall, colour, opacity=opacity, side="double")
 
-    def _spheres(
+    def _bodies(
         self,
         name: str,
         chosen: NDArray[np.bool_],
@@ -178,32 +163,31 @@ class Stage:
         """
         if not chosen.any():
             return None, chosen
-        mesh, count, middle = ball(1.0), int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
-        spheres = self._scene.add_batched_meshes_simple(
+        count, middle = int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
+        bodies = self._scene.add_batched_meshes_simple(
             name,
-            mesh.vertices,
-            mesh.faces,
+            *mesh(UNIT),
             np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            self._obstacles[chosen, :3] - middle,
+            self._middles[chosen] - middle,
             batched_scales=np.full(count, _GONE),
-            batched_colors=rgb(colour),
+            batched_colors=style.rgb(colour),
             opacity=None if origin is None else _GLASS,
             position=middle,
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
         )
-        return spheres, chosen
+        return bodies, chosen
 
-    def _mesh(self, name: str, mesh: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
+    def _mesh(self, name: str, part: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
         """Add a mesh; one that is translucent has its origin in its middle."""
-        middle = np.zeros(3) if opacity is None else mesh.vertices.mean(axis=0)
+        middle = np.zeros(3) if opacity is None else part.vertices.mean(axis=0)
         return self._scene.add_mesh_simple(
             name,
-            mesh.vertices - middle,
-            mesh.faces,
+            part.vertices - middle,
+            part.faces,
             position=middle,
-            color=rgb(colour),
+            color=style.rgb(colour),
             opacity=opacity,
             side=side,
             cast_shadow=False,
@@ -212,7 +196,7 @@ class Stage:
 
     def _lines(self, name: str, points: NDArray[np.float64], colour: str, width: float) -> Any:
         """Add edges (n, 2, 3), so many pixels wide."""
-        return self._scene.add_line_segments(name, points, rgb(colour), thickness=width, thickness_units="screen")
+        return self._scene.add_line_segments(name, points, style.rgb(colour), thickness=width, thickness_units="screen")
 
 
 def _edges(world: World) -> NDArray[np.float64]:

@@ -1,53 +1,18 @@
-"""The options of pictures, checked in one place, and the screen of an environment; nothing heavy is imported here."""
+"""What an environment holds to be drawn: nothing, or the tracks of its rows and pictures or a window made of them."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import time
 
 import numpy as np
 from gymnasium import logger
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
-
-if TYPE_CHECKING:
-    from hydrone_gym.rendering.track import Track
+from hydrone_gym.rendering.camera import View
+from hydrone_gym.rendering.track import Moment, Track, moments
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.simulation import TICK, Simulation
 
 MODES = ("rgb_array", "human")
-CAMERAS = ("overview", "chase")
-LEAST, MOST = 64, 4096  # pixels
-
-
-@dataclass(frozen=True, kw_only=True)
-class View:
-    """What a picture is like; see the docstring of `HydroneEnv`.
-
-    Attributes:
-        size: width and height, pixels; even, as video codecs demand.
-        camera: "overview" or "chase".
-
-    Raises:
-        ValueError: a value out of range, naming the option, its rule and the value.
-    """
-
-    size: tuple[int, int] = (640, 480)
-    camera: str = "overview"
-
-    def __post_init__(self) -> None:
-        """Check every option."""
-        if self.camera not in CAMERAS:
-            raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
-        if not _is_size(self.size):
-            raise ValueError(
-                f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels), got {self.size!r}"
-            )
-        object.__setattr__(self, "size", tuple(map(int, self.size)))
-
-
-def _is_size(size: Any) -> bool:
-    """Whether something is a width and a height."""
-    if not isinstance(size, tuple | list) or len(size) != 2:
-        return False
-    return all(isinstance(n, int) and not isinstance(n, bool) and LEAST <= n <= MOST and n % 2 == 0 for n in size)
 
 
 class Blank:
@@ -60,7 +25,7 @@ class Blank:
             n: which row.
             rows: (rows,) dtype `ROW`.
             seen: (rows, M) 1 for a detected obstacle.
-            obstacles: (k, 4) spheres x, y, z, r in m, k at most M.
+            obstacles: (k, BODY), k at most M.
         """
 
     def add(self, n: int, rows: np.ndarray, references: NDArray[np.float64]) -> None:
@@ -74,15 +39,106 @@ class Blank:
         logger.warn('render() draws nothing without a render_mode; give one when making it: render_mode="rgb_array"')
         return None
 
-    def track(self, n: int) -> "Track | None":
+    def track(self, n: int) -> Track | None:
         """Return a copy of what row n has flown, if that is kept."""
         return None
 
-    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: "Track | None") -> None:
+    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
         """Row n goes on from another state, with what was flown up to there if that is known."""
 
     def close(self) -> None:
         """Nothing is drawn from now on."""
+
+
+class Screen(Blank):
+    """Draws the rows of one environment and never changes them.
+
+    Args:
+        view: what pictures are like.
+        simulation: the environment's; a twin is made, as its working storage is in use.
+        window: show row 0 in a window, tick by tick and in real time, instead of returning pictures.
+
+    Raises:
+        DependencyNotInstalled: a window without pygame.
+    """
+
+    def __init__(self, view: View, simulation: Simulation, window: bool) -> None:
+        """Make all but the tracks."""
+        self._tracks: dict[int, Track] = {}
+        self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
+        # what is heavy is imported by environments that are drawn
+        from hydrone_gym.rendering.frame import Painter
+        from hydrone_gym.rendering.window import Window
+
+        self._painter = Painter(view, simulation.world, simulation.vehicle)
+        self._window = Window(view.size) if window else None
+        self._shown = 0  # ticks of row 0 that the window has shown
+
+    def begin(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8], obstacles: NDArray[np.float64]) -> None:
+        """Row n begins a flight where it is now; see `Blank.begin`."""
+        self._tracks[n] = Track(rows[n : n + 1], obstacles)
+        self._shown = 0
+        self._play(rows, seen)
+
+    def add(self, n: int, rows: np.ndarray, references: NDArray[np.float64]) -> None:
+        """Row n is about to fly a period with its reference of (rows, 4), m and rad."""
+        if n in self._tracks:
+            self._tracks[n].add(rows[n : n + 1], references[n])
+
+    def update(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
+        """Show the period just flown, if there is a window."""
+        self._play(rows, seen)
+
+    def render(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+        """Return a new picture of row n (height, width, 3), or show it and return None.
+
+        Raises ResetNeeded when row n has not begun an episode.
+        """
+        if n not in self._tracks:
+            raise ResetNeeded("there is nothing to draw before the first reset: call reset()")
+        if self._window is None:
+            return self._painter.paint(self._moment(n, rows, seen))
+        self._shown -= 1
+        self._play(rows, seen)
+        return None
+
+    def track(self, n: int) -> Track | None:
+        """Return a copy of what row n has flown."""
+        return self._tracks[n].copy()
+
+    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
+        """Row n goes on from another state; without a track its path begins there."""
+        self._tracks[n] = Track(rows[n : n + 1], obstacles) if track is None else track.copy()
+        self._shown = len(self._tracks[n].ticks(self._simulation))
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+
+    def _moment(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> Moment:
+        track = self._tracks[n]
+        detected = seen[n, : len(track.obstacles)] != 0
+        clock, outcome = float(rows["ticks"][n]) * TICK, Outcome(int(rows["outcome"][n]))
+        return Moment(track.ticks(self._simulation), track.goal, track.obstacles, detected, clock, outcome)
+
+    def _play(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
+        """Show in real time what has not been shown; a machine too slow for that skips pictures, never the last."""
+        window = self._window
+        if window is None or window.closed:
+            return
+        last = self._moment(0, rows, seen)
+        counts = range(self._shown + 1, len(last.ticks) + 1)
+        self._shown = len(last.ticks)
+        due = time.monotonic()
+        for moment in moments(last, counts, self._simulation.world.sensor_range):
+            due += TICK
+            if moment is not last and time.monotonic() > due:
+                continue
+            window.show(self._painter.paint(moment))
+            if window.closed:
+                return
+            time.sleep(max(0.0, due - time.monotonic()))
 
 
 def new_screen(
@@ -109,6 +165,4 @@ def new_screen(
         return Blank()
     if mode not in modes:
         raise ValueError(f"render_mode must be one of None, {', '.join(map(repr, modes))}, got {mode!r}")
-    from hydrone_gym.rendering.screen import Screen
-
     return Screen(view, simulation, window=mode == "human")

@@ -10,8 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.figures import crossing_points, dash, plot_path, plot_tree, save_figure, split_media
+from hydrone_gym.rendering.figures import plot_path, plot_tree, save_figure
 from hydrone_gym.rendering.histories import plot_attitude, plot_position
+from hydrone_gym.rendering.paths import crossing_points, dash, split_media
 from hydrone_gym.rendering.scene3d import Scene
 
 NOTHING = np.zeros((0, 4))
@@ -78,15 +79,15 @@ def test_near_hides_far():
     scene = Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0), azimuth=-60.0)
     eye = scene.camera[2]
     far, near = np.array([0.0, 0.0, 4.0]) - 3.0 * eye, np.array([0.0, 0.0, 4.0]) + 3.0 * eye
-    scene.spheres(np.array([[*near, 1.5]]), ("#00ff00", "#00ff00"))
-    scene.spheres(np.array([[*far, 1.0]]), ("#ff00ff", "#ff00ff"))
+    scene.obstacles(np.array([[*near, 1.5]]), ("#00ff00", "#00ff00"))
+    scene.obstacles(np.array([[*far, 1.0]]), ("#ff00ff", "#ff00ff"))
     scene.lines([np.array([far + 1.5 * eye, far - eye])], "#0000ff", 3.0)
     image = pixels(scene.figure)
     assert count(image, "#00ff00") > 3000
     assert count(image, "#ff00ff") == 0
     assert count(image, "#0000ff") == 0
     sunk = Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0), azimuth=-60.0)
-    sunk.spheres(np.array([[0.0, 0.0, -2.0, 1.0]]), ("#00ff00", "#00ff00"))
+    sunk.obstacles(np.array([[0.0, 0.0, -2.0, 1.0]]), ("#00ff00", "#00ff00"))
     image = pixels(sunk.figure)
     tinted = 0.7 * np.array(to_rgb("#00ff00")) + 0.3 * np.array(to_rgb(style.WATER))
     assert count(image, "#00ff00") == 0
@@ -95,7 +96,7 @@ def test_near_hides_far():
 
 def test_scales_are_equal_on_all_axes():
     scene = Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0))
-    scene.spheres(np.array([[0.0, 0.0, 5.0, 2.0]]), ("#00ff00", "#00ff00"))
+    scene.obstacles(np.array([[0.0, 0.0, 5.0, 2.0]]), ("#00ff00", "#00ff00"))
     image = pixels(scene.figure)
     rows, columns = np.nonzero(np.abs(image - to_rgb("#00ff00")).max(axis=-1) < 0.02)
     assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=3)

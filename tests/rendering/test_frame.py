@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym import HYDRONE, Outcome
 from hydrone_gym.rendering import raycast
-from hydrone_gym.rendering.caption import describe
+from hydrone_gym.rendering.frame import describe
 from tests.rendering.scenes import SIZE, colour_at, moment, paint, painter, towards_eye
 
 
