@@ -7,7 +7,6 @@ for only in the tiles of the picture that it can reach, and a picture without sh
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,8 +197,8 @@ class Canvas:
             box: the world.
         """
         width, height = self.size
-        axes: list[Any] = [tuple(axis.tolist()) for axis in pose[:4]]
-        place = Camera(*axes, pose.pixel(height), (0.5 * width, 0.5 * height)), box
+        eye, right, up, forward = (tuple(axis.tolist()) for axis in pose[:4])
+        place = Camera(eye, right, up, forward, pose.pixel(height), (0.5 * width, 0.5 * height)), box
         if place != self._place:
             self._place, self._still = place, None
         elif self._still is None:  # worth it from the second picture on
