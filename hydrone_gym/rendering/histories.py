@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,9 +35,8 @@ def plot_position(
         zone: half-height of the transition zone, m: a band in z, and the time spent inside it in every panel.
         title: shown above.
     """
-    figure, panels = _three_panels(title)
-    for panel, name, column in zip(panels, "xyz", range(3), strict=True):
-        _panel(panel, f"{name} (m)", times, positions[:, column], references[:, column])
+    labels = ("x (m)", "y (m)", "z (m)")
+    figure, panels = _three_panels(title, times, labels, positions, references)
     panels[2].axhspan(-zone, zone, color=style.WATER, alpha=0.22, linewidth=0)
     panels[2].axhline(0.0, color=style.BLUE, linewidth=1.0)
     _finish(figure, panels, times, positions[:, 2], zone)
@@ -62,13 +62,13 @@ def plot_attitude(
         zone: half-height of the transition zone, m.
         title: shown above.
     """
-    figure, panels = _three_panels(title)
     yaw = np.unwrap(attitudes[:, 2])
     nearest = yaw + (references[:, 2] - yaw + np.pi) % (2.0 * np.pi) - np.pi
     executed = np.degrees(np.column_stack((attitudes[:, :2], yaw)))
     wanted = np.degrees(np.column_stack((references[:, :2], nearest)))
-    for panel, label, column in zip(panels, ("roll φ (°)", "pitch θ (°)", "yaw ψ (°)"), range(3), strict=True):
-        _panel(panel, label, times, executed[:, column], wanted[:, column])
+    labels = ("roll φ (°)", "pitch θ (°)", "yaw ψ (°)")
+    figure, panels = _three_panels(title, times, labels, executed, wanted)
+    for panel in panels:
         low, high = panel.get_ylim()
         if high - low < _LEAST_ANGLE_RANGE:
             middle = 0.5 * (low + high)
@@ -77,8 +77,14 @@ def plot_attitude(
     return figure
 
 
-def _three_panels(title: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure with three panels that share the time axis."""
+def _three_panels(
+    title: str,
+    times: NDArray[np.float64],
+    labels: Sequence[str],
+    executed: NDArray[np.float64],
+    references: NDArray[np.float64],
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with three panels that share the time axis: executed red, reference dotted black."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -86,22 +92,13 @@ def _three_panels(title: str) -> tuple[Figure, list[Axes]]:
         figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")
         panels = list(figure.subplots(3, 1, sharex=True))
         figure.suptitle(title)
+    for panel, label, flown, sent in zip(panels, labels, executed.T, references.T, strict=True):
+        panel.plot(times, flown, color=style.RED, linewidth=2.4)
+        panel.plot(times, sent, color=style.BLACK, linewidth=1.7, linestyle=":")
+        panel.set_ylabel(label)
+        panel.grid(color="#e6e6e6", linewidth=0.6)
+        panel.set_axisbelow(True)
     return figure, panels
-
-
-def _panel(
-    panel: Axes,
-    label: str,
-    times: NDArray[np.float64],
-    executed: NDArray[np.float64],
-    reference: NDArray[np.float64],
-) -> None:
-    """Draw one quantity: executed red, reference dotted black."""
-    panel.plot(times, executed, color=style.RED, linewidth=2.4)
-    panel.plot(times, reference, color=style.BLACK, linewidth=1.7, linestyle=":")
-    panel.set_ylabel(label)
-    panel.grid(color="#e6e6e6", linewidth=0.6)
-    panel.set_axisbelow(True)
 
 
 def _finish(

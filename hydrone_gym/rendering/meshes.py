@@ -1,12 +1,14 @@
-"""Triangles for what a page shows: balls and rods, the vehicle made of them, and the sides of the box."""
+"""Triangles for what a page shows: balls and rods, shapes made of them, and the sides of the box."""
 
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.rendering.solids import CAPSULE
 from hydrone_gym.world.bodies import UNIT, belt, mesh
 
+_THICK = 0.02  # half of a disc
 _RECTANGLE = np.array([(0, 1, 2), (0, 2, 3)])
 
 
@@ -53,25 +55,11 @@ def walls(lower: ArrayLike, upper: ArrayLike, low: float, high: float) -> list[M
     return [Mesh(np.array([floor[k - 1], floor[k], top[k], top[k - 1]]), _RECTANGLE) for k in (1, 2, 3, 0)]
 
 
-class VehicleMeshes(NamedTuple):
-    """The parts of the vehicle by colour, in its own axes."""
-
-    frame: Mesh
-    front: Mesh
-    rotors: Mesh
-
-
-def vehicle(arm: float) -> VehicleMeshes:
-    """Return a vehicle whose rotors lie on its axes, this far (m) from its middle; the front one lies on +x."""
-    ends = arm * np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], dtype=np.float64)
-    up = np.array([0.0, 0.0, arm])
-    body = rod(-0.18 * up, 0.14 * up, 0.3 * arm)
-    arms = [rod((0.0, 0.0, 0.0), end, 0.1 * arm) for end in ends]
-    hubs = [rod(end - 0.3 * up, end + 0.15 * up, 0.07 * arm) for end in ends]
-    screws = [rod(end - 0.32 * up, end - 0.28 * up, 0.3 * arm, 20) for end in ends]
-    rotors = [rod(end + 0.12 * up, end + 0.16 * up, 0.62 * arm, 28) for end in ends]
-    return VehicleMeshes(
-        frame=Mesh.joined(body, *arms[1:], *hubs, *screws),
-        front=Mesh.joined(arms[0], rotors[0]),
-        rotors=Mesh.joined(*rotors[1:]),
-    )
+def model(shapes: NDArray[np.float64], size: float) -> Mesh:
+    """Return capsules and discs of the ray caster as rods, so many times as large."""
+    rods = []
+    for shape in shapes:
+        a, b = shape[1:4], shape[4:7]
+        ends = (a, b) if shape[0] == CAPSULE else (a - _THICK * b, a + _THICK * b)
+        rods.append(rod(size * ends[0], size * ends[1], size * shape[7], 20))
+    return Mesh.joined(*rods)

@@ -42,6 +42,35 @@ def _rows(
     return rows
 
 
+def _model() -> dict[str, Shapes]:
+    """The vehicle by parts, level, the arms on its axes as in the model, the front one on +x; an arm is 1 m long."""
+    ends = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], dtype=np.float64)
+    up = np.array([0.0, 0.0, 1.0])
+    hubs, feet = ends + 0.12 * up, ends - 0.3 * up
+    frame = (
+        _rows(CAPSULE, -0.18 * up, 0.12 * up, 0.26, _ARM),
+        _rows(CAPSULE, np.zeros((3, 3)), ends[1:], 0.11, _ARM),
+        _rows(CAPSULE, feet, hubs, 0.066, _ARM),
+        _rows(DISC, feet, up, 0.3, _ARM),
+    )
+    front = _rows(CAPSULE, np.zeros(3), ends[0], 0.132, _FRONT), _rows(DISC, hubs[0], up, 0.62, _FRONT)
+    return {"frame": np.vstack(frame), "front": np.vstack(front), "rotors": _rows(DISC, hubs[1:], up, 0.62, _REAR)}
+
+
+MODEL = _model()
+
+
+def vehicle(state: NDArray[np.float64], arm: float, scale: float) -> Shapes:
+    """The vehicle at a state (12,), so many times as large as it is; `arm` is from the middle to a rotor, m."""
+    turn, size = Rotation.from_euler("ZXY", state[[5, 3, 4]]).as_matrix(), arm * scale
+    rows = np.vstack(list(MODEL.values()))
+    ends = rows[:, 4:7] @ turn.T
+    rows[:, 1:4] = state[:3] + size * rows[:, 1:4] @ turn.T
+    rows[:, 4:7] = np.where(rows[:, :1] == CAPSULE, state[:3] + size * ends, ends)
+    rows[:, 7] *= size
+    return rows
+
+
 def obstacles(bodies: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
     """Obstacles (M, BODY): dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
     middles, radii = placed(bodies)
@@ -49,38 +78,6 @@ def obstacles(bodies: NDArray[np.float64], detected: NDArray[np.bool_], veiled: 
     glass = _rows(SPHERE, middles, 0.0, radii, style.GLASS, opacity=0.8, foam=1.0)
     rows[detected & veiled, OPACITY] = 0.7
     return np.where(detected[:, None], rows, glass)
-
-
-def vehicle(state: NDArray[np.float64], arm: float, scale: float) -> Shapes:
-    """The vehicle at a state (12,): rotors on its axes as in the model, the front one in the colour of the path.
-
-    Args:
-        state: as in the observation.
-        arm: from the middle to a rotor, m.
-        scale: how many times its true size it is drawn.
-    """
-    turn = Rotation.from_euler("ZXY", state[[5, 3, 4]]).as_matrix()
-    size = arm * scale
-
-    def place(*points: tuple[float, float, float]) -> NDArray[np.float64]:
-        return state[:3] + size * np.array(points) @ turn.T
-
-    hubs = place((1, 0, 0.12), (0, 1, 0.12), (-1, 0, 0.12), (0, -1, 0.12))
-    ends = place((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
-    feet = place((1, 0, -0.3), (0, 1, -0.3), (-1, 0, -0.3), (0, -1, -0.3))
-    low, high = place((0, 0, -0.18), (0, 0, 0.12))
-    front, up, thick = slice(0, 1), turn[:, 2], 0.11 * size
-    return np.vstack(
-        (
-            _rows(CAPSULE, low, high, 0.26 * size, _ARM),
-            _rows(CAPSULE, np.repeat(state[None, :3], 3, axis=0), ends[1:], thick, _ARM),
-            _rows(CAPSULE, state[:3], ends[front], 1.2 * thick, _FRONT),
-            _rows(CAPSULE, feet, hubs, 0.6 * thick, _ARM),
-            _rows(DISC, hubs[1:], up, 0.62 * size, _REAR),
-            _rows(DISC, hubs[front], up, 0.62 * size, _FRONT),
-            _rows(DISC, feet, up, 0.3 * size, _ARM),
-        )
-    )
 
 
 def shadow(position: NDArray[np.float64], floor: float, radius: float) -> Shapes:

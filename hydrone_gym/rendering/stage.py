@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hydrone_gym.rendering import style
+from hydrone_gym.rendering import shapes, style
 from hydrone_gym.rendering.frame import describe
-from hydrone_gym.rendering.meshes import Mesh, ball, slab, vehicle, walls
+from hydrone_gym.rendering.meshes import Mesh, ball, model, slab, walls
 from hydrone_gym.rendering.track import Moment, Tree
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.surface import in_air
@@ -110,13 +110,8 @@ class Stage:
     def _add_vehicle(self, arm: float) -> Any:
         """Add the vehicle; return the frame it moves with."""
         frame = self._scene.add_frame("/vehicle", show_axes=False)
-        parts = vehicle(arm)
-        for name, part, colour in (
-            ("frame", parts.frame, _ARM),
-            ("front", parts.front, style.RED),
-            ("rotors", parts.rotors, _ROTOR),
-        ):
-            self._mesh(f"/vehicle/{name}", part, colour)
+        for name, colour in (("frame", _ARM), ("front", style.RED), ("rotors", _ROTOR)):
+            self._mesh(f"/vehicle/{name}", model(shapes.MODEL[name], arm), colour)
         return frame
 
     def _add_marks(self, moment: Moment, world: World) -> None:

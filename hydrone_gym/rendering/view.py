@@ -1,4 +1,4 @@
-"""What an environment holds to be drawn: nothing, or the tracks of its rows and pictures or a window made of them."""
+"""What an environment holds to be drawn: the tracks of its rows, and pictures or a window made of them."""
 
 import time
 
@@ -15,8 +15,42 @@ from hydrone_gym.simulation.simulation import TICK, Simulation
 MODES = ("rgb_array", "human")
 
 
-class Blank:
-    """The screen of an environment that is not drawn: it keeps nothing and shows nothing."""
+class Screen:
+    """Draws the rows of one environment and never changes them; without a mode it keeps nothing and shows nothing.
+
+    Args:
+        mode: of `modes`; "human" shows row 0 in a window, tick by tick and in real time, instead of returning pictures.
+        size, camera: see `View`.
+        simulation: the environment's; a twin is made, as its working storage is in use.
+        modes: those that the environment knows.
+
+    Raises:
+        ValueError: an option out of range.
+        DependencyNotInstalled: mode "human" without pygame.
+    """
+
+    def __init__(
+        self,
+        mode: str | None,
+        size: tuple[int, int],
+        camera: str,
+        simulation: Simulation,
+        modes: tuple[str, ...] = MODES,
+    ) -> None:
+        """Check the options and make all but the tracks."""
+        view = View(size=size, camera=camera)
+        if mode is not None and mode not in modes:
+            raise ValueError(f"render_mode must be one of None, {', '.join(map(repr, modes))}, got {mode!r}")
+        self._tracks: dict[int, Track] = {}
+        self._shown = 0  # ticks of row 0 that the window has shown
+        self._painter, self._window = None, None
+        if mode is not None:  # what is heavy is imported by environments that are drawn
+            from hydrone_gym.rendering.frame import Painter
+            from hydrone_gym.rendering.window import Window
+
+            self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
+            self._painter = Painter(view, simulation.world, simulation.vehicle)
+            self._window = Window(view.size) if mode == "human" else None
 
     def begin(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8], obstacles: NDArray[np.float64]) -> None:
         """Row n begins a flight where it is now.
@@ -27,58 +61,9 @@ class Blank:
             seen: (rows, M) 1 for a detected obstacle.
             obstacles: (k, BODY), k at most M.
         """
-
-    def add(self, n: int, rows: np.ndarray, references: NDArray[np.float64]) -> None:
-        """Row n is about to fly a period with its reference of (rows, 4), m and rad."""
-
-    def update(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
-        """A period has been flown."""
-
-    def render(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
-        """Return a new picture of row n (height, width, 3), or None if it is shown in a window."""
-        logger.warn('render() draws nothing without a render_mode; give one when making it: render_mode="rgb_array"')
-        return None
-
-    def track(self, n: int) -> Track | None:
-        """Return a copy of what row n has flown, if that is kept."""
-        return None
-
-    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
-        """Row n goes on from another state, with what was flown up to there if that is known."""
-
-    def close(self) -> None:
-        """Nothing is drawn from now on."""
-
-
-class Screen(Blank):
-    """Draws the rows of one environment and never changes them.
-
-    Args:
-        view: what pictures are like.
-        simulation: the environment's; a twin is made, as its working storage is in use.
-        window: show row 0 in a window, tick by tick and in real time, instead of returning pictures.
-
-    Raises:
-        DependencyNotInstalled: a window without pygame.
-    """
-
-    def __init__(self, view: View, simulation: Simulation, window: bool) -> None:
-        """Make all but the tracks."""
-        self._tracks: dict[int, Track] = {}
-        self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
-        # what is heavy is imported by environments that are drawn
-        from hydrone_gym.rendering.frame import Painter
-        from hydrone_gym.rendering.window import Window
-
-        self._painter = Painter(view, simulation.world, simulation.vehicle)
-        self._window = Window(view.size) if window else None
-        self._shown = 0  # ticks of row 0 that the window has shown
-
-    def begin(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8], obstacles: NDArray[np.float64]) -> None:
-        """Row n begins a flight where it is now; see `Blank.begin`."""
-        self._tracks[n] = Track(rows[n : n + 1], obstacles)
+        self.restore(n, rows, obstacles, None)
         self._shown = 0
-        self._play(rows, seen)
+        self.update(rows, seen)
 
     def add(self, n: int, rows: np.ndarray, references: NDArray[np.float64]) -> None:
         """Row n is about to fly a period with its reference of (rows, 4), m and rad."""
@@ -86,46 +71,12 @@ class Screen(Blank):
             self._tracks[n].add(rows[n : n + 1], references[n])
 
     def update(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
-        """Show the period just flown, if there is a window."""
-        self._play(rows, seen)
+        """Show what has not been shown, if there is a window, in real time.
 
-    def render(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
-        """Return a new picture of row n (height, width, 3), or show it and return None.
-
-        Raises ResetNeeded when row n has not begun an episode.
+        A machine too slow for that skips pictures, never the last.
         """
-        if n not in self._tracks:
-            raise ResetNeeded("there is nothing to draw before the first reset: call reset()")
-        if self._window is None:
-            return self._painter.paint(self._moment(n, rows, seen))
-        self._shown -= 1
-        self._play(rows, seen)
-        return None
-
-    def track(self, n: int) -> Track | None:
-        """Return a copy of what row n has flown."""
-        return self._tracks[n].copy()
-
-    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
-        """Row n goes on from another state; without a track its path begins there."""
-        self._tracks[n] = Track(rows[n : n + 1], obstacles) if track is None else track.copy()
-        self._shown = len(self._tracks[n].ticks(self._simulation))
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-
-    def _moment(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> Moment:
-        track = self._tracks[n]
-        detected = seen[n, : len(track.obstacles)] != 0
-        clock, outcome = float(rows["ticks"][n]) * TICK, Outcome(int(rows["outcome"][n]))
-        return Moment(track.ticks(self._simulation), track.goal, track.obstacles, detected, clock, outcome)
-
-    def _play(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
-        """Show in real time what has not been shown; a machine too slow for that skips pictures, never the last."""
         window = self._window
-        if window is None or window.closed:
+        if self._painter is None or window is None or window.closed:
             return
         last = self._moment(0, rows, seen)
         counts = range(self._shown + 1, len(last.ticks) + 1)
@@ -140,29 +91,44 @@ class Screen(Blank):
                 return
             time.sleep(max(0.0, due - time.monotonic()))
 
+    def render(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+        """Return a new picture of row n (height, width, 3), or show it and return None.
 
-def new_screen(
-    mode: str | None,
-    size: tuple[int, int],
-    camera: str,
-    simulation: Simulation,
-    modes: tuple[str, ...] = MODES,
-) -> Blank:
-    """Return what draws an environment.
+        Raises ResetNeeded when row n has not begun an episode.
+        """
+        if self._painter is None:
+            logger.warn(
+                'render() draws nothing without a render_mode; give one when making it: render_mode="rgb_array"'
+            )
+            return None
+        if n not in self._tracks:
+            raise ResetNeeded("there is nothing to draw before the first reset: call reset()")
+        if self._window is None:
+            return self._painter.paint(self._moment(n, rows, seen))
+        self._shown -= 1
+        self.update(rows, seen)
+        return None
 
-    Args:
-        mode: of `modes`, or None to draw nothing.
-        size, camera: see `View`.
-        simulation: the environment's.
-        modes: those it knows.
+    def track(self, n: int) -> Track | None:
+        """Return a copy of what row n has flown, if that is kept."""
+        return self._tracks[n].copy() if n in self._tracks else None
 
-    Raises:
-        ValueError: an option out of range.
-        DependencyNotInstalled: mode "human" without pygame.
-    """
-    view = View(size=size, camera=camera)
-    if mode is None:
-        return Blank()
-    if mode not in modes:
-        raise ValueError(f"render_mode must be one of None, {', '.join(map(repr, modes))}, got {mode!r}")
-    return Screen(view, simulation, window=mode == "human")
+    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
+        """Row n goes on from another state; without a track its path begins there."""
+        if self._painter is not None:
+            self._tracks[n] = Track(rows[n : n + 1], obstacles) if track is None else track.copy()
+            self._shown = len(self._tracks[n].ticks(self._simulation))
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+
+    def _moment(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> Moment:
+        track = self._tracks[n]
+        detected = seen[n, : len(track.obstacles)] != 0
+        clock, outcome = float(rows["ticks"][n]) * TICK, Outcome(int(rows["outcome"][n]))
+        return Moment(track.ticks(self._simulation), track.goal, track.obstacles, detected, clock, outcome)
+
+
+new_screen = Screen  # what environments call
