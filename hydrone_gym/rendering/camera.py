@@ -1,12 +1,11 @@
 """Where a picture is taken from and how large it is, and which part of it a shape can reach."""
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.world.world import World
 
@@ -39,18 +38,14 @@ class View:
         """Check every option."""
         if self.camera not in CAMERAS:
             raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
-        if not _is_size(self.size):
-            raise ValueError(
-                f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels), got {self.size!r}"
-            )
+        rule = f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels)"
+        if not isinstance(self.size, tuple | list) or len(self.size) != 2 or not all(map(_fits, self.size)):
+            raise ValueError(f"{rule}, got {self.size!r}")
         object.__setattr__(self, "size", tuple(map(int, self.size)))
 
 
-def _is_size(size: Any) -> bool:
-    """Whether something is a width and a height."""
-    if not isinstance(size, tuple | list) or len(size) != 2:
-        return False
-    return all(isinstance(n, int) and not isinstance(n, bool) and LEAST <= n <= MOST and n % 2 == 0 for n in size)
+def _fits(n: Any) -> bool:
+    return isinstance(n, int) and not isinstance(n, bool) and LEAST <= n <= MOST and n % 2 == 0
 
 
 class Pose(NamedTuple):
@@ -82,6 +77,13 @@ def looking(direction: NDArray[np.float64], eye: NDArray[np.float64], field: flo
     return Pose(eye, right, np.cross(right, forward), forward, field)
 
 
+def axes(azimuth: float, elevation: float) -> NDArray[np.float64]:
+    """Return right, up and towards the eye (3, 3), unit vectors, of a camera that stands at these angles, degrees."""
+    a, e = np.radians([azimuth, elevation])
+    right, up = (-np.sin(a), np.cos(a), 0.0), (-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e))
+    return np.array([right, up, (np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e))])
+
+
 def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, aspect: float) -> Pose:
     """Return the nearest camera that sees all of some points.
 
@@ -90,8 +92,7 @@ def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, asp
         azimuth, elevation: where it stands as seen from the points, degrees.
         aspect: width by height of the picture.
     """
-    a, e = np.radians([azimuth, elevation])
-    pose = looking(-np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]), np.zeros(3), FIELD_OF_VIEW)
+    pose = looking(-axes(azimuth, elevation)[2], np.zeros(3), FIELD_OF_VIEW)
     tangent = np.tan(np.radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
     depth = corners @ pose.forward
     # a corner is in view when its offset to each side is at most tangent times its depth: linear in the eye's place
@@ -102,12 +103,13 @@ def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, asp
     return pose._replace(eye=across * pose.right + upward * pose.up - back * pose.forward)
 
 
-def side_azimuth(start: Sequence[float], goal: Sequence[float]) -> float:
+def side_azimuth(start: ArrayLike, goal: ArrayLike) -> float:
     """Return the azimuth (degrees) from which the way from start to goal (m) is seen from the side."""
-    return float(np.degrees(np.arctan2(goal[1] - start[1], goal[0] - start[0]))) - 75.0
+    x, y, _ = np.subtract(goal, start)
+    return float(np.degrees(np.arctan2(y, x))) - 75.0
 
 
-def beside(world: World, start: Sequence[float], goal: Sequence[float], aspect: float) -> Pose:
+def beside(world: World, start: ArrayLike, goal: ArrayLike, aspect: float) -> Pose:
     """Return the camera that sees the whole box from the side of the way from start to goal (m)."""
     corners = np.array(list(itertools.product(*zip(world.lower, world.upper, strict=True))))
     return overview(corners, side_azimuth(start, goal), ELEVATION, aspect)

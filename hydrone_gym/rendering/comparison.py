@@ -218,7 +218,7 @@ def _interval(axes: Axes, row: int, low: float, high: float) -> None:
     """Draw the interval of a bar, white beneath dark so that it shows on dark bars too."""
     look: dict[str, Any] = {"solid_capstyle": "butt", "clip_on": False}
     axes.plot([low, high], [row, row], color="white", linewidth=3.6, **look)
-    axes.plot([low, high], [row, row], "|-", color=_EDGE, linewidth=1.6, markersize=9, markeredgewidth=1.6, **look)
+    axes.plot([low, high], [row, row], "|-", color=_EDGE, linewidth=1.6, markersize=10.5, markeredgewidth=1.6, **look)
 
 
 def _limit(axes: Axes, limit: float, label: str) -> None:

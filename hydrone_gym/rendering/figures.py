@@ -17,12 +17,14 @@ from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import side_azimuth
 from hydrone_gym.rendering.paths import crossing_points, dash, split_media
 from hydrone_gym.rendering.scene3d import Scene
+from hydrone_gym.rendering.track import Tree
+from hydrone_gym.world.scenario import Scenario
+from hydrone_gym.world.world import World
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOWER = (-10.0, -10.0, -5.0)  # m: the box of the paper's experiments
-UPPER = (10.0, 10.0, 10.0)
+_BOX = World()  # that of the paper's experiments
 FORMATS = ("png", "pdf")
 _DASH, _GAP = 0.3, 0.21  # m: a path under water
 
@@ -33,8 +35,8 @@ def plot_path(
     detected: NDArray[np.float64],
     undetected: NDArray[np.float64],
     *,
-    lower: tuple[float, float, float] = LOWER,
-    upper: tuple[float, float, float] = UPPER,
+    lower: tuple[float, float, float] = _BOX.lower,
+    upper: tuple[float, float, float] = _BOX.upper,
     title: str = "",
 ) -> Figure:
     """Draw an executed path in its world (paper, Figs. 6 and 9).
@@ -52,59 +54,44 @@ def plot_path(
     air, water = split_media(positions)
     scene.lines(air, style.RED, 2.8, hidden=0.5)
     scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
-    crossings = crossing_points(positions)
-    for number, point in enumerate(crossings):
+    for number, point in enumerate(crossing_points(positions)):
         scene.ring(point, "" if number else "crossing of the surface")
     scene.mark(positions[0], "o", style.BLACK, 10, "start")
     scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    _legend(scene, title, _path_entries(len(undetected) > 0, bool(air), bool(water)))
+    entries = (
+        ("path in air", {"color": style.RED, "linewidth": 2.8}, air),
+        ("path under water", {"color": style.RED, "linewidth": 2.8, "linestyle": (0, (1.6, 1.1))}, water),
+        ("detected obstacle", _ball(style.DETECTED), True),
+        ("undetected obstacle", _ball(style.FAINT), len(undetected)),
+    )
+    _legend(scene, title, [(label, look) for label, look, there in entries if there])
     return scene.figure
 
 
-def plot_tree(
-    edges: NDArray[np.float64],
-    in_air: NDArray[np.bool_],
-    start: Sequence[float],
-    goal: Sequence[float],
-    obstacles: NDArray[np.float64],
-    *,
-    solution: NDArray[np.float64] | None = None,
-    lower: tuple[float, float, float] = LOWER,
-    upper: tuple[float, float, float] = UPPER,
-    title: str = "",
-) -> Figure:
+def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "") -> Figure:
     """Draw a planner's tree with every obstacle known (paper, Fig. 5).
 
     Args:
-        edges: (E, K, 3) the points of each edge, m, K at least 2.
-        in_air: (E,) True for edges in air (red), False for edges under water (purple).
-        start, goal: (3,) m, black dot and purple cross.
-        obstacles: (M, BODY).
-        solution: (N, 3) the chosen path, m, if any.
-        lower, upper: corners of the world, m.
+        tree: edges in air red, those under water purple, the path to the goal black.
+        scenario, world: where it was grown.
         title: shown above.
-
-    Raises:
-        ValueError: edges and media that do not match.
     """
-    edges, in_air = np.asarray(edges, dtype=np.float64), np.asarray(in_air, dtype=bool)
-    if edges.ndim != 3 or edges.shape[1] < 2 or edges.shape[2] != 3 or in_air.shape != edges.shape[:1]:
-        raise ValueError(f"edges must be (E, K, 3) with K >= 2 and in_air (E,), got {edges.shape} and {in_air.shape}")
-    scene = Scene(lower, upper, azimuth=side_azimuth(start, goal))
-    scene.obstacles(obstacles, style.DETECTED)
-    if solution is not None:  # beneath the branches, which keep their colour
-        scene.lines([np.asarray(solution)], style.BLACK, 4.5, lower=2)
-    scene.lines(list(edges[in_air]), style.RED, 1.3)
-    scene.lines(list(edges[~in_air]), style.PURPLE, 1.6)
-    scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
-    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    entries: list[tuple[str, dict[str, Any]]] = [
+    start, goal = scenario.start[:3], scenario.goal
+    scene = Scene(world.lower, world.upper, azimuth=side_azimuth(start, goal))
+    scene.obstacles(scenario.obstacles, style.DETECTED)
+    entries = [
         ("branch in air", {"color": style.RED, "linewidth": 2.0}),
         ("branch under water", {"color": style.PURPLE, "linewidth": 2.0}),
-        ("obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}),
+        ("obstacle", _ball(style.DETECTED)),
     ]
-    if solution is not None:
+    if len(tree.path):  # beneath the branches, which keep their colour
+        solution = tree.edges[tree.path]
+        scene.lines([np.concatenate((solution[:1, 0], solution[:, 1]))], style.BLACK, 4.5, lower=2)
         entries.insert(2, ("chosen path", {"color": style.BLACK, "linewidth": 4.5}))
+    scene.lines(list(tree.edges[tree.air]), style.RED, 1.3)
+    scene.lines(list(tree.edges[~tree.air]), style.PURPLE, 1.6)
+    scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
+    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
     _legend(scene, title, entries)
     return scene.figure
 
@@ -114,11 +101,8 @@ def save_figure(figure: Figure, path: str | Path) -> list[Path]:
     written = [Path(f"{path}.{suffix}") for suffix in FORMATS]
     for target in written:
         # no date inside, so equal flights give equal files
-        figure.savefig(
-            target,
-            dpi=style.DOTS_PER_INCH,
-            metadata={"CreationDate": None} if target.suffix == ".pdf" else None,
-        )
+        dateless = {"CreationDate": None} if target.suffix == ".pdf" else None
+        figure.savefig(target, dpi=style.DOTS_PER_INCH, metadata=dateless)
     return written
 
 
@@ -136,16 +120,6 @@ def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, Any]]])
         scene.figure.suptitle(title, y=0.975)
 
 
-_BALL = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
-
-
-def _path_entries(unknown: bool, air: bool, water: bool) -> list[tuple[str, dict[str, Any]]]:
-    entries: list[tuple[str, dict[str, Any]]] = []
-    if air:
-        entries.append(("path in air", {"color": style.RED, "linewidth": 2.8}))
-    if water:
-        entries.append(("path under water", {"color": style.RED, "linewidth": 2.8, "linestyle": (0, (1.6, 1.1))}))
-    entries.append(("detected obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}))
-    if unknown:
-        entries.append(("undetected obstacle", {**_BALL, "markerfacecolor": style.FAINT[0]}))
-    return entries
+def _ball(shades: tuple[str, str]) -> dict[str, Any]:
+    look = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
+    return {**look, "markerfacecolor": shades[0]}

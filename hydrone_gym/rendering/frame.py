@@ -12,21 +12,12 @@ from hydrone_gym.rendering.camera import Pose, View, beside, chase
 from hydrone_gym.rendering.raycast import Canvas
 from hydrone_gym.rendering.track import Moment
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.surface import in_air
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.bodies import gaps_along
 from hydrone_gym.world.world import World
 
 _VEHICLE_PIXELS = 34.0  # how wide the vehicle is at least, from the overview
 _OVERVIEW_SCALE = 2.5  # times its true size
-_ENDS = {
-    Outcome.GOAL: "goal reached",
-    Outcome.COLLISION: "collision",
-    Outcome.OUT_OF_BOUNDS: "out of bounds",
-    Outcome.ROUGH_TRANSITION: "rough crossing",
-    Outcome.TIMEOUT: "time is up",
-    Outcome.DIVERGED: "out of control",
-}
 _GROUND, _GOOD, _BAD = "#1f2d3a", style.GREEN, "#b04a00"  # behind white letters
 _OPACITY = 0.85
 _LABELS = 16  # captions that are kept: pictures of about the same time share one
@@ -56,7 +47,8 @@ class Painter:
         scale = 1.0 if following else max(_OVERVIEW_SCALE, widest)
         box = Box(self.world.lower, self.world.upper, self.world.zone, float(following))
         image = self._canvas.picture(self._shapes(moment, pose, unit, scale), pose, box)
-        _write(image, *describe(moment.time, position[2], self.world.zone, moment.outcome))
+        ground = {Outcome.RUNNING: _GROUND, Outcome.GOAL: _GOOD}.get(moment.outcome, _BAD)
+        _write(image, "   ".join(moment.words(self.world.zone)), ground)
         return image
 
     def pose(self, moment: Moment) -> Pose:
@@ -64,7 +56,7 @@ class Painter:
         width, height = self.view.size
         if self.view.camera == "chase":
             return chase(moment.ticks[:, :3], moment.goal)
-        return beside(self.world, moment.ticks[0, :3].tolist(), moment.goal.tolist(), width / height)
+        return beside(self.world, moment.ticks[0, :3], moment.goal, width / height)
 
     def _unit(self, pose: Pose, point: NDArray[np.float64]) -> float:
         """How much a pixel covers at a point (m): thin things are measured in it, to stay visible in any picture."""
@@ -92,21 +84,6 @@ class Painter:
         if self.view.camera == "overview":
             return np.zeros(len(moment.obstacles), bool)
         return gaps_along(pose.eye, moment.ticks[-1, :3], moment.obstacles) < self.vehicle.radius
-
-
-def describe(time: float, z: float, zone: float, outcome: Outcome) -> tuple[str, str]:
-    """Return what is written about a moment, and the colour behind it.
-
-    Args:
-        time: s.
-        z: height of the vehicle, m.
-        zone: half-height of the transition zone, m.
-        outcome: of the mission.
-    """
-    if outcome is not Outcome.RUNNING:
-        return f"{time:.1f} s   {_ENDS[outcome]}", _GOOD if outcome is Outcome.GOAL else _BAD
-    medium = "in the air" if in_air(z) else "under water"
-    return f"{time:.1f} s   {'crossing' if abs(z) <= zone else medium}", _GROUND
 
 
 @functools.lru_cache(_LABELS)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import FIELD_OF_VIEW, beside
-from hydrone_gym.rendering.frame import describe
 from hydrone_gym.rendering.stage import DETECTED, GRID, UNKNOWN, VEHICLE_SCALE, Stage
 from hydrone_gym.rendering.track import Flown, Moment, Tree, moment_of, moments
 from hydrone_gym.simulation.simulation import TICK, Simulation
 from hydrone_gym.world.world import World
 
+# width by height of a window, where a camera sees the whole box from, and the point it turns around (m)
+_Fitted = tuple[float, NDArray[np.float64], NDArray[np.float64]]
 HOLD = 2.0  # s: the end stays in view before the page begins again
 _ASPECTS = (0.4, 0.45, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5)  # width by height of windows
 _FLIGHT = (
@@ -126,47 +127,30 @@ def _record(recording: Any, stage: Stage, last: Moment, simulation: Simulation, 
         recording.insert_sleep(TICK if tick < len(last.ticks) - 1 else HOLD)
 
 
-class CameraPose(NamedTuple):
-    """Where a camera sees the whole box from, in windows of this shape or wider ones."""
-
-    aspect: float  # width by height
-    eye: NDArray[np.float64]  # (3,) m
-    towards: NDArray[np.float64]  # (3,) m: the point it turns around
-
-
-def _camera_poses(moment: Moment, world: World) -> list[CameraPose]:
+def _camera_poses(moment: Moment, world: World) -> list[_Fitted]:
     """Return cameras beside the way from start to goal, for windows from narrow to wide."""
     middle = 0.5 * np.add(world.lower, world.upper)
     poses = []
     for aspect in _ASPECTS:
-        pose = beside(world, moment.ticks[0, :3].tolist(), moment.goal.tolist(), aspect)
+        pose = beside(world, moment.ticks[0, :3], moment.goal, aspect)
         depth = float((middle - pose.eye) @ pose.forward)
-        poses.append(CameraPose(aspect, pose.eye, pose.eye + depth * pose.forward))
+        poses.append((aspect, pose.eye, pose.eye + depth * pose.forward))
     return poses
 
 
-def _dressed(page: str, title: str, last: Moment, world: World, poses: list[CameraPose], *, trees: bool) -> str:
-    """Return viser's page with its title, legend and camera.
-
-    Args:
-        page: HTML.
-        title: of the page, plain text.
-        last: the end of the mission.
-        world: its world.
-        poses: cameras, from narrow to wide.
-        trees: whether trees are shown.
-    """
-    end = describe(last.time, float(last.ticks[-1, 2]), world.zone, last.outcome)[0].split("   ")
+def _dressed(page: str, title: str, last: Moment, world: World, poses: list[_Fitted], *, trees: bool) -> str:
+    """Return viser's page with its title (plain text), its legend, and the cameras, from narrow to wide."""
+    time, end = last.words(world.zone)
     entries = "".join(
         f'<li><i class="{kind}" style="background:{colour}"></i>{text}</li>'
         for kind, colour, text in (*_FLIGHT, *(_TREE if trees else ()))
     )
     about = (
-        f'<div id="title"><h1>{escape(title)}</h1><p>{end[1]} after {end[0]}</p></div>'
+        f'<div id="title"><h1>{escape(title)}</h1><p>{end} after {time}</p></div>'
         f'<details id="legend"><summary>Legend</summary><ul>{entries}</ul><p>Lines on the floor every {GRID:g} m; '
         f"vehicle {VEHICLE_SCALE:g} times its size, its front orange. Drag to turn, space to pause.</p></details>"
     )
-    places = json.dumps([(pose.aspect, *(",".join(f"{x:.2f}" for x in place) for place in pose[1:])) for pose in poses])
+    places = json.dumps([(aspect, *(",".join(f"{x:.2f}" for x in point) for point in pose)) for aspect, *pose in poses])
     head = f"<style>{_STYLE}</style><script>{_SCRIPT % places}</script></head>"
     page = page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
     return page.replace("</head>", head, 1).replace("</body>", f"{about}</body>", 1)

@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.camera import ELEVATION
+from hydrone_gym.rendering.camera import ELEVATION, axes
 from hydrone_gym.rendering.paths import pieces
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import bounds, section, support
 
 if TYPE_CHECKING:
-    from matplotlib.collections import Collection
     from matplotlib.figure import Figure
 
 _UNDER, _SURFACE, _ABOVE, _TOP = 1000.0, 2000.0, 3000.0, 4000.0  # paint order
@@ -40,40 +39,35 @@ class Scene:
 
     Args:
         lower, upper: corners of the box, m.
-        elevation, azimuth: where the camera stands, degrees; it must look down on the water.
+        azimuth: where the camera stands, degrees.
     """
 
     def __init__(
-        self,
-        lower: tuple[float, float, float],
-        upper: tuple[float, float, float],
-        elevation: float = ELEVATION,
-        azimuth: float = -60.0,
+        self, lower: tuple[float, float, float], upper: tuple[float, float, float], azimuth: float = -60.0
     ) -> None:
         """Make the figure, its axes and the water surface."""
         import mpl_toolkits.mplot3d  # noqa: F401  (registers the projection)
         from matplotlib import rc_context
         from matplotlib.figure import Figure
 
-        self.camera = camera_axes(elevation, azimuth)
+        self.camera = axes(azimuth, ELEVATION)
         self._lower, self._upper = np.array(lower), np.array(upper)
         self._centre = 0.5 * (self._lower + self._upper)
         self._reach = float(np.linalg.norm(self._upper - self._lower))
         with rc_context(style.FONTS):
             self.figure: Figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH)
             self.axes: Any = self.figure.add_axes((0.01, 0.09, 0.97, 0.89), projection="3d", computed_zorder=False)
-        self._frame(elevation, azimuth)
+        self._frame(azimuth)
         self._surface()
 
-    def _frame(self, elevation: float, azimuth: float) -> None:
-        """Camera, limits, equal scale on all axes, labels and a quiet background."""
+    def _frame(self, azimuth: float) -> None:
+        """Limits, equal scale on all axes, labels and a quiet background."""
         from matplotlib.ticker import MultipleLocator
 
         ax = self.axes
         ax.set_proj_type("ortho")
-        ax.view_init(elev=elevation, azim=azimuth)
-        ax.set(xlim=(self._lower[0], self._upper[0]), ylim=(self._lower[1], self._upper[1]))
-        ax.set_zlim(self._lower[2], self._upper[2])
+        ax.view_init(elev=ELEVATION, azim=azimuth)
+        ax.set(**dict(zip(("xlim", "ylim", "zlim"), np.stack((self._lower, self._upper), axis=1), strict=True)))
         ax.set_box_aspect(self._upper - self._lower, zoom=1.16)
         ax.set_xlabel("x (m)", labelpad=8)
         ax.set_ylabel("y (m)", labelpad=8)
@@ -89,48 +83,32 @@ class Scene:
 
         (x0, y0, _), (x1, y1, _) = self._lower, self._upper
         corners = [[(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)]]
-        face = _rgba(style.WATER, 0.30)
-        plane = Poly3DCollection(corners, facecolors=[face], edgecolors=[_rgba(style.BLUE, 0.5)], linewidths=0.8)
-        plane.set_zorder(_SURFACE)
-        self._add(plane)
+        look = {"facecolors": [_rgba(style.WATER, 0.30)], "edgecolors": [_rgba(style.BLUE, 0.5)], "linewidths": 0.8}
+        self._add(Poly3DCollection(corners, zorder=_SURFACE, clip_on=False, **look))
 
-    def _add(self, collection: Collection) -> None:
-        """Add a collection; what reaches beyond the axes' rectangle is drawn too."""
-        collection.set_clip_on(False)
+    def _add(self, collection: Any) -> None:
         self.axes.add_collection3d(collection, autolim=False)
 
-    def _order(self, point: NDArray[np.float64], above: bool) -> float:
-        """Paint order of something at a point: nearer to the eye is later."""
-        nearness = float((point - self._centre) @ self.camera[2]) / self._reach + 0.5
-        return (_ABOVE if above else _UNDER) + 900.0 * min(max(nearness, 0.0), 1.0)
+    def _order(self, points: NDArray[np.float64], above: Any) -> NDArray[np.float64]:
+        """Paint order of things at points (…, 3): nearer to the eye is later."""
+        nearness = (points - self._centre) @ self.camera[2] / self._reach + 0.5
+        return np.where(above, _ABOVE, _UNDER) + 900.0 * np.clip(nearness, 0.0, 1.0)
 
     def obstacles(self, bodies: NDArray[np.float64], shades: tuple[str, str], alpha: float = 1.0) -> None:
         """Add obstacles (M, BODY), shaded from the darkest to the lightest of two colours."""
-        for body, box in zip(bodies, bounds(bodies), strict=True):
-            if not in_air(box[0, 2]):
-                self._obstacle(body, box, shades, alpha, False)
-            if in_air(box[1, 2]):
-                self._obstacle(body, box, shades, alpha, True)
-
-    def _obstacle(
-        self,
-        body: NDArray[np.float64],
-        box: NDArray[np.float64],
-        shades: tuple[str, str],
-        alpha: float,
-        above: bool,
-    ) -> None:
-        """Add one obstacle, or only what of it rises above the water."""
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-        polygons = outlines(body, self.camera, above)
         dark, light = (_rgba(shade, alpha) for shade in shades)
-        faces = np.linspace(dark, light, max(len(polygons), 2))[: len(polygons)]
-        edges = np.zeros_like(faces)
-        edges[0] = _rgba("#888888", alpha)
-        patch = Poly3DCollection(polygons, facecolors=faces, edgecolors=edges, linewidths=0.5)
-        patch.set_zorder(self._order(box.mean(axis=0), above))
-        self._add(patch)
+        for body, box in zip(bodies, bounds(bodies), strict=True):
+            dry = in_air(box[:, 2])
+            for above in np.unique(dry):  # what rises above the water once more, over the surface
+                polygons = outlines(body, self.camera, above)
+                faces = np.linspace(dark, light, max(len(polygons), 2))[: len(polygons)]
+                edges = np.zeros_like(faces)
+                edges[:1] = _rgba("#888888", alpha)
+                order = float(self._order(box.mean(axis=0), above))
+                look = {"facecolors": faces, "edgecolors": edges, "linewidths": 0.5, "zorder": order}
+                self._add(Poly3DCollection(polygons, clip_on=False, **look))
 
     def lines(
         self, polylines: list[NDArray[np.float64]], colour: str, width: float, hidden: float = 0.0, lower: int = 0
@@ -146,19 +124,14 @@ class Scene:
         if not parts:
             return
         middles = np.array([part.mean(axis=0) for part in parts])
-        above = in_air(middles[:, 2])
-        order = np.array([self._order(middle, up) for middle, up in zip(middles, above, strict=True)])
-        slices = np.floor(order / (900.0 / _BINS)).astype(int)
+        slices = np.floor(self._order(middles, in_air(middles[:, 2])) / (900.0 / _BINS)).astype(int)
         for number in np.unique(slices):
-            chosen = np.flatnonzero(slices == number)
-            painted = Line3DCollection([parts[i] for i in chosen], colors=[colour], linewidths=width)
-            painted.set_capstyle("round")
-            painted.set_zorder((number - lower) * (900.0 / _BINS))
-            self._add(painted)
+            chosen = [parts[i] for i in np.flatnonzero(slices == number)]
+            look = {"linewidths": width, "capstyle": "round", "zorder": (number - lower) * (900.0 / _BINS)}
+            self._add(Line3DCollection(chosen, colors=[colour], clip_on=False, **look))
         if hidden > 0.0:
-            ghost = Line3DCollection(polylines, colors=[_rgba(colour, hidden)], linewidths=0.6 * width)
-            ghost.set_zorder(_TOP - 100.0)
-            self._add(ghost)
+            look = {"linewidths": 0.6 * width, "zorder": _TOP - 100.0}
+            self._add(Line3DCollection(polylines, colors=[_rgba(colour, hidden)], clip_on=False, **look))
 
     def mark(self, point: NDArray[np.float64], symbol: str, colour: str, size: float, label: str) -> None:
         """Add a mark at a point (3,) in m, never hidden; X and + are strokes, other symbols are filled discs."""
@@ -181,15 +154,6 @@ def _rgba(colour: str, alpha: float) -> tuple[float, float, float, float]:
     return to_rgba(colour, alpha)
 
 
-def camera_axes(elevation: float, azimuth: float) -> NDArray[np.float64]:
-    """Return the camera's right, up and towards-the-eye directions in the world, (3, 3), from angles in degrees."""
-    e, a = np.radians([elevation, azimuth])
-    right = [-np.sin(a), np.cos(a), 0.0]
-    up = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
-    eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
-    return np.array([right, up, eye])
-
-
 def _rim(axis: NDArray[np.float64], half_angle: float) -> NDArray[np.float64]:
     """Unit directions (n, 3) at an angle (rad) from a unit axis."""
     first = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
@@ -204,7 +168,7 @@ def outlines(body: NDArray[np.float64], camera: NDArray[np.float64], above: bool
 
     Args:
         body: (BODY,) see `hydrone_gym.world.bodies`.
-        camera: from `camera_axes`.
+        camera: from `hydrone_gym.rendering.camera.axes`.
         above: keep only what rises above the water; polygons that do not are left out.
     """
     light = _LIGHT / np.linalg.norm(_LIGHT) @ camera

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import shapes, style
-from hydrone_gym.rendering.frame import describe
 from hydrone_gym.rendering.meshes import Mesh, ball, model, slab, walls
 from hydrone_gym.rendering.track import Moment, Tree
 from hydrone_gym.simulation.simulation import Simulation
@@ -56,11 +55,9 @@ class Stage:
         self._add_box(simulation.world)
         self._add_water(simulation.world)
         dry = in_air(self._middles[:, 2])
-        self._known = [self._bodies("/obstacles/detected", np.ones(len(dry), bool), DETECTED)]
-        self._unknown = [
-            self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom)),
-            self._bodies("/obstacles/unknown, in the air", dry, UNKNOWN, (x, y, 0.5 * top)),
-        ]
+        self._known = self._bodies("/obstacles/detected", dry | True, DETECTED)
+        self._unknown = self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom))
+        self._unknown += self._bodies("/obstacles/unknown, in the air", dry, UNKNOWN, (x, y, 0.5 * top))
 
     def show(self, moment: Moment) -> None:
         """Move to a moment; to be called for every tick in order."""
@@ -69,13 +66,12 @@ class Stage:
         self._vehicle.position, self._vehicle.wxyz = state[:3], turn.as_quat(scalar_first=True)
         self._reference.position = reference
         self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
-        self._label.text = ", ".join(describe(moment.time, state[2], self._world.zone, moment.outcome)[0].split("   "))
+        self._label.text = ", ".join(moment.words(self._world.zone))
         self._grow(moment.ticks[:, :3])
         for group, there in ((self._known, moment.detected), (self._unknown, ~moment.detected)):
             scales = np.where(there, self._sizes, _GONE).astype(np.float32)
             for bodies, chosen in group:
-                if bodies is not None:
-                    bodies.batched_scales = scales[chosen]
+                bodies.batched_scales = scales[chosen]
 
     def plan(self, tree: Tree) -> None:
         """Show the tree of a period, and the path in it."""
@@ -146,18 +142,11 @@ class Stage:
                 self._mesh(f"/{name} {k}", wall, colour, opacity=opacity, side="double")
 
     def _bodies(
-        self,
-        name: str,
-        chosen: NDArray[np.bool_],
-        colour: str,
-        origin: tuple[float, float, float] | None = None,
-    ) -> tuple[Any, NDArray[np.bool_]]:
-        """Add some of the obstacles in one look, none of them there yet; return them, None for none, and which.
-
-        With an origin (m) they are glass.
-        """
+        self, name: str, chosen: NDArray[np.bool_], colour: str, origin: tuple[float, float, float] | None = None
+    ) -> list[tuple[Any, NDArray[np.bool_]]]:
+        """Add some of the obstacles in one look, if any, none of them there yet; with an origin (m) they are glass."""
         if not chosen.any():
-            return None, chosen
+            return []
         count, middle = int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
         bodies = self._scene.add_batched_meshes_simple(
             name,
@@ -172,7 +161,7 @@ class Stage:
             cast_shadow=False,
             receive_shadow=False,
         )
-        return bodies, chosen
+        return [(bodies, chosen)]
 
     def _mesh(self, name: str, part: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
         """Add a mesh; one that is translucent has its origin in its middle."""

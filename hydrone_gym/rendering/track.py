@@ -3,6 +3,7 @@
 A track keeps what was sent, and is flown again only when it is drawn.
 """
 
+import copy
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, Protocol
 
@@ -11,10 +12,19 @@ from numpy.typing import NDArray
 
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import TICK, Simulation, trajectory
+from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import distances
 from hydrone_gym.world.scenario import Scenario
 
 Ticks = NDArray[np.float64]  # (N, 16) a row a tick: state (12), and reference x, y, z in m and yaw in rad (4)
+_ENDS = {
+    Outcome.GOAL: "goal reached",
+    Outcome.COLLISION: "collision",
+    Outcome.OUT_OF_BOUNDS: "out of bounds",
+    Outcome.ROUGH_TRANSITION: "rough crossing",
+    Outcome.TIMEOUT: "time is up",
+    Outcome.DIVERGED: "out of control",
+}
 _SLACK = 1e-3  # m: ticks are samples, sensing is continuous
 
 
@@ -52,8 +62,7 @@ class Track:
 
     def copy(self) -> "Track":
         """Return a track that goes on by itself; arrays are shared, as none is ever changed."""
-        twin = Track.__new__(Track)
-        twin.goal, twin.obstacles = self.goal, self.obstacles
+        twin = copy.copy(self)
         twin._parts, twin._waiting = self._parts.copy(), self._waiting.copy()
         return twin
 
@@ -67,6 +76,12 @@ class Moment(NamedTuple):
     detected: NDArray[np.bool_]  # (M,)
     time: float  # s
     outcome: Outcome
+
+    def words(self, zone: float) -> tuple[str, str]:
+        """Return the time, and how the mission ended or else where it is; `zone` (m) is half of the transition zone."""
+        z = float(self.ticks[-1, 2])
+        medium = "crossing" if abs(z) <= zone else "in the air" if in_air(z) else "under water"
+        return f"{self.time:.1f} s", _ENDS.get(self.outcome, medium)
 
 
 def moments(last: Moment, counts: Iterable[int], sensor_range: float) -> Iterator[Moment]:
@@ -119,13 +134,13 @@ class Flown(Protocol):
 
 def moment_of(flight: Flown) -> Moment:
     """Return the end of a flight as a moment to be drawn."""
-    known = {tuple(sphere) for sphere in flight.detected.tolist()}
+    known = {tuple(body) for body in flight.detected.tolist()}
     obstacles = flight.scenario.obstacles
     return Moment(
         ticks=np.hstack((flight.trace.states, flight.trace.references)),
         goal=np.array(flight.scenario.goal),
         obstacles=obstacles,
-        detected=np.array([tuple(sphere) in known for sphere in obstacles.tolist()], dtype=bool),
+        detected=np.array([tuple(body) in known for body in obstacles.tolist()], dtype=bool),
         time=flight.time,
         outcome=flight.outcome,
     )

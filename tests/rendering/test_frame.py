@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym import HYDRONE, Outcome
 from hydrone_gym.rendering import raycast
-from hydrone_gym.rendering.frame import describe
 from tests.rendering.scenes import SIZE, colour_at, moment, paint, painter, towards_eye
 
 
@@ -161,11 +160,10 @@ def test_looking_only_in_the_tiles_of_an_outline_misses_nothing(camera, monkeypa
 
 
 def test_words():
-    assert describe(12.34, 5.0, 0.8, Outcome.RUNNING)[0] == "12.3 s   in the air"
-    assert describe(12.34, -0.3, 0.8, Outcome.RUNNING)[0] == "12.3 s   crossing"
-    assert describe(12.34, -2.0, 0.8, Outcome.RUNNING)[0] == "12.3 s   under water"
-    texts = {describe(1.0, 1.0, 0.8, outcome)[0] for outcome in Outcome}
-    assert len(texts) == len(Outcome)
+    heights = {5.0: "in the air", -0.3: "crossing", -2.0: "under water"}
+    for z, word in heights.items():
+        assert moment((0.0, -6.0, z))._replace(time=12.34).words(0.8) == ("12.3 s", word)
+    assert len({moment()._replace(outcome=outcome).words(0.8) for outcome in Outcome}) == len(Outcome)
     running, ended = moment(), moment()._replace(outcome=Outcome.GOAL)
     changed = np.nonzero((paint(running) != paint(ended)).any(axis=2))
     assert changed[0].min() > 200

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from hydrone_gym.rendering.scene3d import camera_axes, outlines
+from hydrone_gym.rendering.camera import axes
+from hydrone_gym.rendering.scene3d import outlines
 
-CAMERA = camera_axes(20.0, -60.0)
+CAMERA = axes(-60.0, 20.0)
 
 
 def area(polygon):
@@ -17,7 +18,7 @@ def area(polygon):
 def test_camera_axes_are_orthonormal_and_right_handed():
     np.testing.assert_allclose(CAMERA @ CAMERA.T, np.eye(3), atol=1e-15)
     np.testing.assert_allclose(np.cross(CAMERA[0], CAMERA[1]), CAMERA[2], atol=1e-15)
-    np.testing.assert_allclose(camera_axes(90.0, -90.0), np.eye(3), atol=1e-15)  # a map: x right, y up
+    np.testing.assert_allclose(axes(-90.0, 90.0), np.eye(3), atol=1e-15)  # a map: x right, y up
 
 
 def test_outline_is_a_circle_and_caps_lie_inside():
