@@ -84,14 +84,6 @@ def span_of(camera, box, d):
 
 
 @inlined
-def sky(dz):
-    """Background in a direction of which the upward part is dz."""
-    if dz > 0.0:
-        return mix(_HORIZON, _ZENITH, min(1.7 * dz, 1.0))
-    return mix(_HORIZON, _BELOW, min(-1.4 * dz, 1.0))
-
-
-@inlined
 def _stroke(distance, half_width, blur, t, camera, slope, across, normal):
     """How much of a pixel a line on a plane covers.
 
@@ -140,13 +132,6 @@ def _haze(box, t):
 
 
 @inlined
-def _floor(camera, box, span, d, t):
-    """The sand, with a grid."""
-    line = _level_lines(camera, box, span, d, t, 0.045, t * camera.pixel * (1.0 - span.by[2]))
-    return mix(mix(_SAND, _LINE, 0.55 * line), _HORIZON, _haze(box, t))
-
-
-@inlined
 def _wall(camera, box, span, axis, d, t):
     """How strongly a wall of the box is drawn at a point: (grid, edges with the waterline, transition zone)."""
     x, y = (camera.right[0], camera.up[0]), (camera.right[1], camera.up[1])
@@ -171,15 +156,22 @@ def _wall(camera, box, span, axis, d, t):
 
 @inlined
 def exit_colour(camera, box, span, d):
-    """What a ray sees that meets no shape: floor, far wall or sky."""
-    background = sky(d[2])
-    if span.leave <= max(span.enter, 0.0):
+    """What a ray sees that meets no shape: the sandy floor with its grid, far wall or sky."""
+    if d[2] > 0.0:
+        background = mix(_HORIZON, _ZENITH, min(1.7 * d[2], 1.0))
+    else:
+        background = mix(_HORIZON, _BELOW, min(-1.4 * d[2], 1.0))
+    t = span.leave
+    if t <= max(span.enter, 0.0):
         return background
     if span.leave_axis == 2:
-        return _floor(camera, box, span, d, span.leave) if d[2] < 0.0 else background
+        if d[2] >= 0.0:
+            return background
+        line = _level_lines(camera, box, span, d, t, 0.045, t * camera.pixel * (1.0 - span.by[2]))
+        return mix(mix(_SAND, _LINE, 0.55 * line), _HORIZON, _haze(box, t))
     if box.sea > 0.0:
         return background
-    grid, edge, band = _wall(camera, box, span, span.leave_axis, d, span.leave)
+    grid, edge, band = _wall(camera, box, span, span.leave_axis, d, t)
     colour = mix(background, (0.34, 0.71, 0.91), 0.45 * band)
     return mix(colour, _LINE, max(0.30 * grid, 0.5 * edge))
 

@@ -62,12 +62,7 @@ def plot_success(rates: Rates, *, title: str = "") -> Figure:
 
 
 def plot_distributions(
-    values: Mapping[str, ArrayLike],
-    label: str,
-    *,
-    title: str = "",
-    limit: float | None = None,
-    limit_label: str = "",
+    values: Mapping[str, ArrayLike], label: str, *, title: str = "", limit: float | None = None, limit_label: str = ""
 ) -> Figure:
     """Draw a box a policy: quartiles and median, whiskers from the 5th to the 95th percentile, single values beyond.
 
@@ -111,19 +106,10 @@ def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title
             if shares.shape != (len(counts), 3):
                 raise ValueError(f"rates of {policy} must have shape ({len(counts)}, 3), got {shares.shape}")
             places = np.asarray(counts) + step * (index - 0.5 * (len(rates) - 1))
-            axes.errorbar(
-                places,
-                shares[:, 0],
-                yerr=np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None),
-                color=colour(index),
-                marker=_MARKERS[index % len(_MARKERS)],
-                markersize=6.5,
-                linewidth=1.6,
-                linestyle="-" if index < len(COLOURS) else "--",
-                elinewidth=1.2,
-                label=shortened(policy, _LABEL),
-                **_RIM,
-            )
+            look: dict[str, Any] = {"color": colour(index), "marker": _MARKERS[index % len(_MARKERS)], **_RIM}
+            look |= {"linestyle": "-" if index < len(COLOURS) else "--", "linewidth": 1.6, "elinewidth": 1.2}
+            reach = np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None)
+            axes.errorbar(places, shares[:, 0], yerr=reach, markersize=6.5, label=shortened(policy, _LABEL), **look)
         axes.set_xticks(counts)
         axes.set_ylim(top=102.0)
         axes.set_xlabel("number of obstacles")
@@ -146,10 +132,14 @@ def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "")
         axes.set_xscale("log")
         for row, (p50, p99) in enumerate(times.values()):
             axes.plot([p50, p99], [row, row], color=colour(row), linewidth=3.0, solid_capstyle="round")
-            for value, marker in ((p50, "o"), (p99, "D")):
-                axes.plot(
-                    value, row, marker, color=colour(row), markersize=8, markeredgecolor=_EDGE, markeredgewidth=0.7
-                )
+            look: dict[str, Any] = {
+                "color": colour(row),
+                "markersize": 8,
+                "markeredgecolor": _EDGE,
+                "markeredgewidth": 0.7,
+            }
+            axes.plot(p50, row, "o", **look)
+            axes.plot(p99, row, "D", **look)
             _note(axes, row, f"{p50:.2g} / {p99:.2g}")
         axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
         axes.xaxis.set_minor_formatter(NullFormatter())

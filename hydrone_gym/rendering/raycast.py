@@ -114,11 +114,6 @@ def _ray(camera, column, row):
 
 
 @inlined
-def _byte(value):
-    return np.uint8(max(0.0, min(255.0, 255.0 * value + 0.5)))
-
-
-@inlined
 def _smooth(marks, row, column):
     """Whether the pixels around one see the same things as it does."""
     height, width = marks.shape
@@ -170,7 +165,7 @@ def cast(image, marks, known, place, shapes, begins, items, found):
                 if mark == _EMPTY:
                     continue
                 for k in range(3):
-                    image[row, column, k] = _byte(colour[k])
+                    image[row, column, k] = np.uint8(max(0.0, min(255.0, 255.0 * colour[k] + 0.5)))
                 if not fine:
                     marks[row, column] = mark
 

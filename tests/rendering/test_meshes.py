@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from hydrone_gym.rendering.meshes import Mesh, ball, model, rod, slab, walls
 from hydrone_gym.rendering.shapes import MODEL
+from hydrone_gym.rendering.stage import Mesh, ball, model, rod, slab, walls
 
 
 def volume(mesh):
