@@ -39,7 +39,7 @@ _FILES = {
     SUMMARY: "the statistics, arguments, versions, commit and machine",
     TABLES: "the tables as Markdown",
 }
-Flown = Mapping[Record, tuple[Path, Record]]
+Written = Mapping[Record, tuple[Path, Record]]
 
 
 def write_report(
@@ -74,14 +74,14 @@ def write_report(
         for name in _FILES:
             if (source / name).exists():
                 shutil.copyfile(source / name, target / name)
-    flown: Flown = {}
+    flown: Written = {}
     if replay is not None:
         flown = write_replays(shown, plan or plan_of(stored.arguments), target / REPLAYS, replay)
     write_whole(target / PAGE, _page(stored, shown, flown, target))
     return target / PAGE
 
 
-def _page(stored: Stored, shown: Sequence[Shown], flown: Flown, folder: Path) -> str:
+def _page(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> str:
     """Fill the template."""
     suites = list(stored.arguments["suites"])
     several = f"{len(stored.policies)} policies" if len(stored.policies) > 1 else stored.policies[0]
@@ -181,7 +181,7 @@ def _chart(chart: Chart) -> str:
     return f'<h3 id="{name}">{escape(chart.heading)}</h3>\n<figure>\n{caption}\n{panels}\n</figure>'
 
 
-def _replays(stored: Stored, shown: Sequence[Shown], flown: Flown, folder: Path) -> str:
+def _replays(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> str:
     """Return the table of the flights that show each policy, with links or with how to fly them."""
     rows = []
     for entry in shown:

@@ -88,11 +88,9 @@ def _stroke(distance, half_width, blur, t, camera, slope, across, normal):
     """How much of a pixel a line on a plane covers.
 
     Args:
-        distance: from the line's middle, along one axis of the plane, m.
-        half_width: of the line, m.
+        distance, half_width: from its middle, along one axis of the plane, and its own, m.
         blur: no pixel is wider than this there, m.
-        t: length of the ray, m.
-        camera: the camera.
+        t, camera: length of the ray, m, and its camera.
         slope: the ray's part along that axis by its part along the plane's normal.
         across, normal: the parts of the camera's right and up along that axis, and along the normal.
     """

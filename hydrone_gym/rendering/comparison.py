@@ -132,12 +132,7 @@ def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "")
         axes.set_xscale("log")
         for row, (p50, p99) in enumerate(times.values()):
             axes.plot([p50, p99], [row, row], color=colour(row), linewidth=3.0, solid_capstyle="round")
-            look: dict[str, Any] = {
-                "color": colour(row),
-                "markersize": 8,
-                "markeredgecolor": _EDGE,
-                "markeredgewidth": 0.7,
-            }
+            look: dict[str, Any] = {"color": colour(row), "markersize": 8, **_RIM, "markeredgewidth": 0.7}
             axes.plot(p50, row, "o", **look)
             axes.plot(p99, row, "D", **look)
             _note(axes, row, f"{p50:.2g} / {p99:.2g}")

@@ -25,15 +25,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BOX = World()  # that of the paper's experiments
+Array = NDArray[np.float64]
 FORMATS = ("png", "pdf")
 _DASH, _GAP = 0.3, 0.21  # m: a path under water
 
 
 def plot_path(
-    positions: NDArray[np.float64],
+    positions: Array,
     goal: Sequence[float],
-    detected: NDArray[np.float64],
-    undetected: NDArray[np.float64],
+    detected: Array,
+    undetected: Array,
     *,
     lower: tuple[float, float, float] = _BOX.lower,
     upper: tuple[float, float, float] = _BOX.upper,

@@ -15,17 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Array = NDArray[np.float64]
 _LEAST_ANGLE_RANGE = 4.0  # degrees: a straight flight must not look wild
 
 
-def plot_position(
-    times: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    references: NDArray[np.float64],
-    *,
-    zone: float = 0.8,
-    title: str = "",
-) -> Figure:
+def plot_position(times: Array, positions: Array, references: Array, *, zone: float = 0.8, title: str = "") -> Figure:
     """Draw x, y, z over time, executed and reference (paper, Figs. 7 and 10).
 
     Args:
@@ -44,13 +38,7 @@ def plot_position(
 
 
 def plot_attitude(
-    times: NDArray[np.float64],
-    attitudes: NDArray[np.float64],
-    references: NDArray[np.float64],
-    heights: NDArray[np.float64],
-    *,
-    zone: float = 0.8,
-    title: str = "",
+    times: Array, attitudes: Array, references: Array, heights: Array, *, zone: float = 0.8, title: str = ""
 ) -> Figure:
     """Draw roll, pitch and yaw over time, executed and reference (paper, Figs. 8 and 11).
 
@@ -78,11 +66,7 @@ def plot_attitude(
 
 
 def _three_panels(
-    title: str,
-    times: NDArray[np.float64],
-    labels: Sequence[str],
-    executed: NDArray[np.float64],
-    references: NDArray[np.float64],
+    title: str, times: Array, labels: Sequence[str], executed: Array, references: Array
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with three panels that share the time axis: executed red, reference dotted black."""
     from matplotlib import rc_context
@@ -101,9 +85,7 @@ def _three_panels(
     return figure, panels
 
 
-def _finish(
-    figure: Figure, panels: list[Axes], times: NDArray[np.float64], heights: NDArray[np.float64], zone: float
-) -> None:
+def _finish(figure: Figure, panels: list[Axes], times: Array, heights: Array, zone: float) -> None:
     """Shade the time inside the zone, mark the crossings, align the labels and add the legend."""
     from matplotlib import rc_context
     from matplotlib.lines import Line2D

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNDER, _SURFACE, _ABOVE, _TOP = 1000.0, 2000.0, 3000.0, 4000.0  # paint order
+Array = NDArray[np.float64]
 _BINS = 40  # a path is painted in this many slices of depth
 _PIECE = 0.25  # m: longest piece of a path that lies in one slice
 # half-angles of the lit caps, all in full view of the camera
@@ -89,12 +90,12 @@ class Scene:
     def _add(self, collection: Any) -> None:
         self.axes.add_collection3d(collection, autolim=False)
 
-    def _order(self, points: NDArray[np.float64], above: Any) -> NDArray[np.float64]:
+    def _order(self, points: Array, above: Any) -> Array:
         """Paint order of things at points (…, 3): nearer to the eye is later."""
         nearness = (points - self._centre) @ self.camera[2] / self._reach + 0.5
         return np.where(above, _ABOVE, _UNDER) + 900.0 * np.clip(nearness, 0.0, 1.0)
 
-    def obstacles(self, bodies: NDArray[np.float64], shades: tuple[str, str], alpha: float = 1.0) -> None:
+    def obstacles(self, bodies: Array, shades: tuple[str, str], alpha: float = 1.0) -> None:
         """Add obstacles (M, BODY), shaded from the darkest to the lightest of two colours."""
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -110,9 +111,7 @@ class Scene:
                 look = {"facecolors": faces, "edgecolors": edges, "linewidths": 0.5, "zorder": order}
                 self._add(Poly3DCollection(polygons, clip_on=False, **look))
 
-    def lines(
-        self, polylines: list[NDArray[np.float64]], colour: str, width: float, hidden: float = 0.0, lower: int = 0
-    ) -> None:
+    def lines(self, polylines: list[Array], colour: str, width: float, hidden: float = 0.0, lower: int = 0) -> None:
         """Add polylines, each (n, 3) in m.
 
         `hidden` is the opacity with which what obstacles hide shines through. `lower` puts a wide line beneath the thin
@@ -133,18 +132,18 @@ class Scene:
             look = {"linewidths": 0.6 * width, "zorder": _TOP - 100.0}
             self._add(Line3DCollection(polylines, colors=[_rgba(colour, hidden)], clip_on=False, **look))
 
-    def mark(self, point: NDArray[np.float64], symbol: str, colour: str, size: float, label: str) -> None:
+    def mark(self, point: Array, symbol: str, colour: str, size: float, label: str) -> None:
         """Add a mark at a point (3,) in m, never hidden; X and + are strokes, other symbols are filled discs."""
         edge = colour if symbol in "x+" else "white"
         look = {"markerfacecolor": colour, "markeredgecolor": edge, "markeredgewidth": 1.0}
         self._plot(point, label, {"marker": symbol, "markersize": size, "zorder": _TOP, **look})
 
-    def ring(self, point: NDArray[np.float64], label: str) -> None:
+    def ring(self, point: Array, label: str) -> None:
         """Mark a crossing of the surface at a point (3,) in m with an open ring."""
         look = {"markerfacecolor": "none", "markeredgecolor": style.BLUE, "markeredgewidth": 2.2}
         self._plot(point, label, {"marker": "o", "markersize": 11, "zorder": _TOP - 1.0, **look})
 
-    def _plot(self, point: NDArray[np.float64], label: str, look: dict[str, Any]) -> None:
+    def _plot(self, point: Array, label: str, look: dict[str, Any]) -> None:
         self.axes.plot(*np.reshape(point, (3, 1)), linestyle="none", label=label, **look)
 
 
@@ -154,7 +153,7 @@ def _rgba(colour: str, alpha: float) -> tuple[float, float, float, float]:
     return to_rgba(colour, alpha)
 
 
-def _rim(axis: NDArray[np.float64], half_angle: float) -> NDArray[np.float64]:
+def _rim(axis: Array, half_angle: float) -> Array:
     """Unit directions (n, 3) at an angle (rad) from a unit axis."""
     first = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
     first /= np.linalg.norm(first)
@@ -163,7 +162,7 @@ def _rim(axis: NDArray[np.float64], half_angle: float) -> NDArray[np.float64]:
     return np.cos(half_angle) * axis + np.sin(half_angle) * circle
 
 
-def outlines(body: NDArray[np.float64], camera: NDArray[np.float64], above: bool) -> list[NDArray[np.float64]]:
+def outlines(body: Array, camera: Array, above: bool) -> list[Array]:
     """Return the outline of an obstacle and of its lit caps, darkest first, as polygons in the world, each (n, 3).
 
     Args:

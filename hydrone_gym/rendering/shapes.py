@@ -11,6 +11,7 @@ from hydrone_gym.rendering.solids import CAPSULE, DISC, OPACITY, SHADOW, SHAPE_F
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import placed
 
+Shades = tuple[str, str]  # away from and towards the sun
 Shapes = NDArray[np.float64]  # (n, len(SHAPE_FIELDS))
 _BLACK = ("#101010", "#4a4a4a")
 _WHITE = ("#e8e8e8", "#ffffff")
@@ -25,19 +26,13 @@ _PLUMB = ("#4f6475", "#6d8596")
 
 
 def _rows(
-    kind: int,
-    a: ArrayLike,
-    b: ArrayLike,
-    radius: ArrayLike,
-    colours: tuple[str, str],
-    opacity: float = 1.0,
-    foam: float = 0.0,
+    kind: int, a: ArrayLike, b: ArrayLike, radius: ArrayLike, shades: Shades, opacity: float = 1.0, foam: float = 0.0
 ) -> Shapes:
-    """Return shapes that share their colours; `a` is (n, 3), `b` (n, 3) or (3,), `radius` (n,) or a number, in m."""
+    """Return shapes of equal colours; `a` is (n, 3), `b` (n, 3) or (3,), `radius` (n,) or a number, in m."""
     first = np.atleast_2d(np.asarray(a, dtype=np.float64))
     rows = np.empty((len(first), len(SHAPE_FIELDS)))
     rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7] = kind, first, b, radius
-    rows[:, 8:11], rows[:, 11:14] = style.rgb(colours[0]), style.rgb(colours[1])
+    rows[:, 8:11], rows[:, 11:14] = style.rgb(shades[0]), style.rgb(shades[1])
     rows[:, 14], rows[:, 15] = opacity, foam
     return rows
 
