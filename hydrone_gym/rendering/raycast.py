@@ -53,13 +53,8 @@ def _keep(found, count, t, layer):
 
 
 @inlined
-def _trace(place, shapes, items, tile, found, d, known):
-    """Follow one ray, unless it meets no shape and what is there without shapes is known.
-
-    Returns:
-        Red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
-    """
-    camera, box = place
+def _meet_all(shapes, items, tile, found, d):
+    """Return the way to the nearest opaque shape of a tile, which one, and how many translucent ones are found."""
     end, hit, count = math.inf, -1, 0
     for k in range(tile[0], tile[1]):
         item = items[k]
@@ -69,6 +64,18 @@ def _trace(place, shapes, items, tile, found, d, known):
                 count = _keep(found, count, t, item)
             else:
                 end, hit = t, item
+    return end, hit, count
+
+
+@inlined
+def _trace(place, shapes, items, tile, found, d, known):
+    """Follow one ray, unless it meets no shape and what is there without shapes is known.
+
+    Returns:
+        Red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
+    """
+    camera, box = place
+    end, hit, count = _meet_all(shapes, items, tile, found, d)
     if known and hit < 0 and count == 0:
         return 0.0, 0.0, 0.0, _EMPTY
     span = span_of(camera, box, d)
