@@ -53,10 +53,9 @@ class Painter:
 
     def pose(self, moment: Moment) -> Pose:
         """Return where a picture is taken from."""
-        width, height = self.view.size
         if self.view.camera == "chase":
             return chase(moment.ticks[:, :3], moment.goal)
-        return beside(self.world, moment.ticks[0, :3], moment.goal, width / height)
+        return beside(self.world, moment.ticks[0, :3], moment.goal, self.view.size[0] / self.view.size[1])
 
     def _unit(self, pose: Pose, point: NDArray[np.float64]) -> float:
         """How much a pixel covers at a point (m): thin things are measured in it, to stay visible in any picture."""

@@ -59,7 +59,9 @@ class Stage:
         """Add everything that stands still, and what moves where it begins."""
         self._scene, self._world = scene, simulation.world
         self._middles, self._sizes = placed(moment.obstacles)
-        self._vehicle = self._add_vehicle(simulation.vehicle.arm * VEHICLE_SCALE)
+        self._vehicle = scene.add_frame("/vehicle", show_axes=False)
+        for name, colour in (("frame", _ARM), ("front", style.RED), ("rotors", _ROTOR)):
+            self._mesh(f"/vehicle/{name}", model(shapes.MODEL[name], simulation.vehicle.arm * VEHICLE_SCALE), colour)
         self._reference = self._mesh("/reference", ball(0.14, rings=8), style.BLACK)
         (x0, y0, bottom), (x1, y1, top) = simulation.world.lower, simulation.world.upper
         x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
@@ -119,13 +121,6 @@ class Stage:
             self._path = self._lines(f"/path/{first}", edges, style.RED, 4.0)
         else:
             self._path.points = edges.astype(np.float32)
-
-    def _add_vehicle(self, arm: float) -> Any:
-        """Add the vehicle; return the frame it moves with."""
-        frame = self._scene.add_frame("/vehicle", show_axes=False)
-        for name, colour in (("frame", _ARM), ("front", style.RED), ("rotors", _ROTOR)):
-            self._mesh(f"/vehicle/{name}", model(shapes.MODEL[name], arm), colour)
-        return frame
 
     def _add_marks(self, moment: Moment, world: World) -> None:
         """Add start and goal, each with a line to the surface."""

@@ -8,8 +8,6 @@ from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
-_TITLE = "hydrone_gym"
-
 
 class Window:
     """Shows pictures until it is closed, by its user or by the program.
@@ -58,7 +56,7 @@ class Window:
             logger.warn(f'render_mode="human" shows nothing: {error}')
             self.closed = True
             return False
-        self._pygame.display.set_caption(_TITLE)
+        self._pygame.display.set_caption("hydrone_gym")
         Window._shown += 1
         return True
 
