@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hydrone_gym.cli.missions import Mission, MissionOptions
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.report import draw_flight, flight_record
@@ -98,21 +96,9 @@ def _draw_tree(mission: Mission, folder: Path) -> list[Path]:
 
     everything = {**mission.observation, "obstacles": mission.scenario.obstacles}
     tree = mission.policy.grow_tree(everything, _TREE_ITERATIONS)
-    path = tree.edges[tree.path]
-    solution = np.concatenate((path[:1, 0], path[:, 1])) if len(path) else None
     world = mission.env.get_wrapper_attr("world")
     title = f"{mission.name.replace('-', ' ').capitalize()}: tree of {len(tree.edges)} edges, every obstacle known"
-    figure = plot_tree(
-        tree.edges,
-        tree.air,
-        mission.scenario.start[:3],
-        mission.scenario.goal,
-        mission.scenario.obstacles,
-        solution=solution,
-        lower=world.lower,
-        upper=world.upper,
-        title=title,
-    )
+    figure = plot_tree(tree, mission.scenario, world, title=title)
     return save_figure(figure, folder / f"{mission.name}-tree")
 
 
