@@ -101,6 +101,12 @@ def lane_of(memory):
     )
 
 
+@inlined
+def with_first(lane, number):
+    """The same rollout with the first so many of its obstacles."""
+    return Lane(lane.address, lane.ticks, lane.values, lane.block, lane.obstacles, lane.closest, number)
+
+
 @routine
 def propagate(lane, start, end, goal, reference):
     """Fly a vehicle for one period toward a reference and write where it ends; returns a `Result`.
