@@ -3,8 +3,8 @@
 import dataclasses
 import itertools
 import pickle
-import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -242,17 +242,20 @@ def test_report():
     assert history[0].memory.report.edges > 20
 
 
-def test_time_budget_is_kept():
-    env = make("AirToWater")
-    planner = CLRRT.for_env(env, time_budget=0.02)
+def test_time_budget_is_kept(monkeypatch):
+    """By a clock that ticks 4 ms with every look at it: the tree grows until the budget is spent, and no longer."""
+    looks = itertools.count()
+    monkeypatch.setattr("planners.cl_rrt.policy.time", SimpleNamespace(perf_counter=lambda: 0.004 * next(looks)))
+    env = make("AirToWater", num_obstacles=40)
     observation, _ = env.reset(seed=0)
-    _, state = planner.predict(observation)
-    taken = []
-    for _ in range(10):
-        started = time.perf_counter()
-        planner.predict(observation, state)
-        taken.append(time.perf_counter() - started)
-    assert 0.02 <= np.median(taken) < 0.2
+    nodes = []
+    for budget in (0.01, 0.1):
+        before = next(looks)
+        _, (memory,) = CLRRT.for_env(env, time_budget=budget).predict(observation)
+        nodes.append(memory.report.nodes)
+        spent = 0.004 * (next(looks) - before - 2)  # the last look is the report's
+        assert budget < spent <= budget + 0.009
+    assert nodes[0] < nodes[1]
 
 
 def test_evaluate_policy_flies_it():
