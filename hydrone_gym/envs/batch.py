@@ -1,118 +1,261 @@
-"""Many episodes at once: storage, threads and resets behind the vector environment."""
+"""The core of both environments: episodes, resets, observations and threads for any number of rows.
+
+The single environment is row 0 of a batch of one; the vector environment adds Gymnasium's rules for resets.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
-from hydrone_gym.envs.task import REPORT, begin_rows, new_episodes, pack_task, settle
+from hydrone_gym.envs.requests import load_references
+from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
+from hydrone_gym.envs.task import OUTCOME, REPORT, Missions, begin_rows, new_episodes, pack_task, settle
+from hydrone_gym.perception.egocentric import EgocentricRows
+from hydrone_gym.perception.perceived import Perceived, perceive
+from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.block import LANES
+from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.bodies import NOWHERE
 from hydrone_gym.world.generator import draw, first_numbers, prepare
 from hydrone_gym.world.placement import place_many
 from hydrone_gym.world.scenario import Scenario
 
 _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
-_NOWHERE = 1e160  # m: its square overflows, so a sphere there is at distance inf
+
+FLAT = ""  # key of an observation that is one array
+ReferenceFilter = Callable[[Perceived, NDArray[np.float64], NDArray[np.bool_]], NDArray[np.float64]]
+
+
+class Returned:
+    """What a step returns of all rows, in new arrays that are filled part by part.
+
+    `observations`; the report as `columns` (len(REPORT), n); `transitions` (n,), a list of crossings a row; and with
+    rows that began anew at once their last observation in `final` (n,).
+    """
+
+    def __init__(self, batch: "EpisodeBatch", *, observed: bool = True) -> None:
+        """Make room."""
+        self._batch = batch
+        self._shown = {key: np.empty_like(array, order="C") for key, array in batch.shown.items()} if observed else {}
+        self.columns = np.empty((len(REPORT), batch.count))
+        self.transitions, self.final = np.full((2, batch.count), None, dtype=object)
+
+    def fill(self, part: slice) -> None:
+        """Copy what a part of the rows shows now."""
+        for key, array in self._shown.items():
+            array[part] = self._batch.shown[key][part]
+        self.columns[:, part] = self._batch.episodes.report[part].T
+        self.transitions[part] = self._batch.transitions[part]
+
+    @property
+    def observations(self) -> Any:
+        """A dict of arrays with "world" rows, one array with "egocentric" ones."""
+        return self._shown.get(FLAT, self._shown)
 
 
 class EpisodeBatch:
-    """The episodes of a vector environment, advanced sixteen lanes at a time.
+    """The episodes of an environment.
 
     Args:
         options: what every row flies.
         count: number of rows.
+        lanes: how many rows are advanced in one go: 1 for a single row, 16 for batches.
         threads: blocks of lanes are spread over this many threads when there are enough rows.
+        render_modes: those it can be drawn in.
     """
 
-    def __init__(self, options: Options, count: int, threads: int = 1) -> None:
+    def __init__(
+        self, options: Options, count: int, lanes: int, threads: int = 1, render_modes: tuple[str, ...] = ("rgb_array",)
+    ) -> None:
         """Make the storage; rows hold no episode before `begin`."""
-        self.options = options
-        self.count = count
-        self.episodes = new_episodes(count, options.num_obstacles, LANES)
-        self.report = np.zeros((count, len(REPORT)))
-        self.scenarios: list[Scenario | None] = [None] * count
-        world, vehicle = options.world, options.vehicle
+        self.options, self.count, self.lanes = options, count, lanes
+        vehicle, world = named_vehicle(options.vehicle), options.world
+        self.episodes = new_episodes(count, options.num_obstacles, lanes)
+        self.transitions = np.full(count, None, dtype=object)
+        self.ended = np.ones(count, bool)
+        self.starting = np.zeros(count, bool)
+        self.generators: list[np.random.Generator] = []
+        self.reference_filter: ReferenceFilter | None = None
         self._law = options.law
         self._prepared = prepare(self._law, world, vehicle.radius)
-        self._task = pack_task(vehicle, world, options.time_limit)
-        self._order = np.arange(count)
+        self._task = pack_task(vehicle, world, options.time_limit, lanes)
         threads = max(1, min(threads, count // _ROWS_A_THREAD))
-        self.simulations = [Simulation(vehicle, world, options.period, LANES) for _ in range(threads)]
-        blocks = -(-count // LANES)
-        edges = [LANES * round(blocks * k / threads) for k in range(threads)] + [count]
+        self.simulations = [Simulation(vehicle, world, options.period, lanes) for _ in range(threads)]
+        self.screen = new_screen(
+            options.render_mode, options.render_size, options.camera, self.simulations[0], render_modes
+        )
+        self.egocentric = EgocentricRows(vehicle, world, count) if options.interface == "egocentric" else None
+        references, raw = action_space(world), observation_space(vehicle, world, options.num_obstacles)
+        self.sphere_space: Any = raw["obstacles"]
+        self.action_space = references if self.egocentric is None else relative_action_space()
+        self.observation_space = raw if self.egocentric is None else egocentric_space()
+        self.low, self.high = references.low.astype(np.float64), references.high.astype(np.float64)
+        self._bind()
+
+    def _bind(self) -> None:
+        """Make what shares memory with the episodes, and the threads."""
+        now, lanes, threads = self.episodes, self.lanes, len(self.simulations)
+        self.perceived = perceive(now.rows, now.known, now.found)
+        self.shown = self.perceived.observation() if self.egocentric is None else {FLAT: self.egocentric.seen}
+        blocks = -(-self.count // lanes)
+        edges = [lanes * round(blocks * k / threads) for k in range(threads)] + [self.count]
         self._parts = [slice(a, b) for a, b in pairwise(edges)]
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._orders = [np.arange(part.start, part.stop) for part in self._parts]
+        self._flown = []
+        for part in self._parts:
+            own = slice(part.start // lanes, -(-part.stop // lanes))
+            self._flown.append((now.rows[part], now.obstacles[own], now.closest[own]))
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
-    def advance(self, references: NDArray[np.float64]) -> None:
-        """Fly one period toward references (n, 4), then judge every row into `report`."""
-        if self._pool is None:
-            self._advance_part(0, references)
-            return
-        jobs = [self._pool.submit(self._advance_part, k, references) for k in range(len(self._parts))]
-        for job in jobs:
-            job.result()
+    def __getstate__(self) -> dict[str, Any]:
+        shared = ("perceived", "shown", "_flown", "_pool")
+        return {name: value for name, value in self.__dict__.items() if name not in shared}
 
-    def _advance_part(self, k: int, references: NDArray[np.float64]) -> None:
-        part, now, count = self._parts[k], self.episodes, self.options.num_obstacles
-        blocks = slice(part.start // LANES, -(-part.stop // LANES))
-        self.simulations[k].advance(now.rows[part], references[part], now.obstacles[blocks], now.closest[blocks], count)
-        settle(*now, count, LANES, self._task, self._order[part], self.report)
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def observation_of(self, row: int) -> Any:
+        """Return a new observation of a row."""
+        if self.egocentric is not None:
+            return self.egocentric.seen[row].copy()
+        return {key: array[row].copy() for key, array in self.shown.items()}
+
+    def references(self, actions: ArrayLike) -> NDArray[np.float64]:
+        """Return the references (n, 4) that actions stand for, as they are flown.
+
+        Raises ValueError for actions of another shape or that are not finite.
+        """
+        if self.egocentric is None:
+            references = load_references(actions, self.low, self.high, self.count)
+        else:
+            references = self.egocentric.references(actions, self.perceived)
+        if self.reference_filter is not None:
+            references = self.reference_filter(self.perceived, references, self.starting.copy())
+        return references
+
+    def advance(self, references: NDArray[np.float64], k: int = 0) -> None:
+        """Fly part k of the rows one period toward references (n, 4), then judge them."""
+        part = self._parts[k]
+        rows, obstacles, closest = self._flown[k]
+        self.simulations[k].advance(rows, references[part], obstacles, closest, self.options.num_obstacles)
+        settle(self.episodes, self._task, part.start, part.stop)
+
+    def look(self, k: int = 0) -> None:
+        """Look at part k of the rows, once a period."""
+        if self.egocentric is not None:
+            self.egocentric.look(self.perceived, self._orders[k])
+
+    def note_crossings(self, part: slice) -> None:
+        """Append the crossings of this period; lists handed out before are left alone."""
+        rows = part.start + np.flatnonzero(self.episodes.report[part, -1])
+        if rows.size:
+            logs, counts = self.episodes.rows["crossing_log"][rows].tolist(), self.episodes.report[rows, -1].tolist()
+            for row, log, count in zip(rows.tolist(), logs, counts, strict=True):
+                self.transitions[row] = [*self.transitions[row], *crossings_of(log, int(count))]
+
+    def fly(self, references: NDArray[np.float64], *, same_step: bool) -> tuple[Returned, Returned]:
+        """Fly one period toward references (n, 4); rows that had ended before begin anew instead.
+
+        With `same_step`, rows that end now begin anew at once. Returns what there is then, and what there was before,
+        without observations but the final ones; else twice the same.
+        """
+        now = Returned(self)
+        before = Returned(self, observed=False) if same_step else now
+        self.starting[:] = False
+        self._spread(lambda k: self._fly_part(k, references, now, before))
+        return now, before
+
+    def _fly_part(self, k: int, references: NDArray[np.float64], now: Returned, before: Returned) -> None:
+        part = self._parts[k]
+        self.advance(references, k)
+        self.note_crossings(part)
+        again = part.start + np.flatnonzero(self.ended[part])
+        if again.size:
+            self.begin(again, look=False)
+        self.look(k)
+        outcome = self.episodes.report[part, OUTCOME]
+        if before is not now:
+            before.fill(part)
+            again = part.start + np.flatnonzero(outcome != RUNNING)
+            for row in again.tolist():
+                before.final[row] = self.observation_of(row)
+            if again.size:
+                self.begin(again)
+        now.fill(part)
+        self.ended[part] = outcome != RUNNING
+
+    def _spread(self, work: Callable[[int], None]) -> None:
+        """Do every part's work, the first of them in this thread."""
+        jobs = [] if self._pool is None else [self._pool.submit(work, k) for k in range(1, len(self._parts))]
+        try:
+            work(0)
+        finally:
+            for job in jobs:
+                job.result()
 
     def begin(
-        self,
-        rows: NDArray[np.intp],
-        generators: Sequence[np.random.Generator],
-        scenarios: Sequence[Scenario | None],
+        self, rows: NDArray[np.int64], scenarios: Sequence[Scenario | None] | None = None, *, look: bool = True
     ) -> None:
         """Begin new episodes.
 
         Args:
             rows: (k,) which.
-            generators: one for each row of the batch.
-            scenarios: (k,) what to fly; None draws one from the row's generator.
+            scenarios: (k,) what to fly; None draws one from the row's own random stream.
+            look: whether to look at them, as is to be done once a period.
         """
         count = self.options.num_obstacles
-        starts, goals = np.empty((len(rows), 4)), np.empty((len(rows), 3))
-        spheres = np.empty((len(rows), count, 4))
-        drawn = [k for k, scenario in enumerate(scenarios) if scenario is None]
-        if drawn:
-            self._draw(rows, drawn, generators, starts, goals, spheres)
-        for k, scenario in enumerate(scenarios):
+        missions = Missions(np.empty((len(rows), 4)), np.empty((len(rows), 3)), np.empty((len(rows), count, 4)))
+        chosen = [None] * len(rows) if scenarios is None else scenarios
+        self._draw(rows, [k for k, scenario in enumerate(chosen) if scenario is None], missions)
+        for k, scenario in enumerate(chosen):
             if scenario is not None:
-                starts[k], goals[k] = scenario.start, scenario.goal
-                starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
                 given = len(scenario.obstacles)
-                spheres[k, :given] = scenario.obstacles
-                spheres[k, given:] = (_NOWHERE, 0.0, 0.0, 0.0)
-        begin_rows(*self.episodes, count, LANES, self._task, rows, starts, goals, spheres, self.report)
+                missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
+                missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
+                missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE
+        begin_rows(self.episodes, missions, rows, self._task)
+        for row in rows.tolist():
+            self.transitions[row] = []
+        self.ended[rows], self.starting[rows] = False, True
+        if self.egocentric is not None:
+            self.egocentric.begin(rows)
+            if look:
+                self.egocentric.look(self.perceived, rows)
+
+    def _draw(self, rows: NDArray[np.int64], drawn: list[int], missions: Missions) -> None:
+        """Draw scenarios, each from its row's own stream: one kernel call places all, the rare rest goes one by one."""
+        if not drawn:
+            return
+        law, generators = self._law, [self.generators[row] for row in rows[drawn].tolist()]
+        numbers = np.empty((len(drawn), first_numbers(law)))
+        for generator, line in zip(generators, numbers, strict=True):
+            generator.random(out=line)
+        solved = place_many(*self._prepared, numbers, np.array(drawn), *missions)
+        for i in np.flatnonzero(~solved).tolist():
+            own = (array[drawn[i]] for array in missions)
+            draw(law, self._prepared, generators[i], *own, numbers[i])
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""
-        block, lane = divmod(row, LANES)
-        found = self.episodes.obstacles[block].reshape(self.options.num_obstacles, 4, LANES)[:, :, lane]
+        block, lane = divmod(row, self.lanes)
+        found = self.episodes.obstacles[block].reshape(self.options.num_obstacles, 4, self.lanes)[:, :, lane]
         return found[found[:, 3] > 0.0]
 
-    def _draw(
-        self,
-        rows: NDArray[np.intp],
-        drawn: list[int],
-        generators: Sequence[np.random.Generator],
-        starts: NDArray[np.float64],
-        goals: NDArray[np.float64],
-        spheres: NDArray[np.float64],
-    ) -> None:
-        """Draw scenarios, each from its row's own stream: one kernel call places all, the rare rest goes one by one."""
-        law = self._law
-        numbers = np.empty((len(drawn), first_numbers(law)))
-        for line, k in zip(numbers, drawn, strict=True):
-            generators[rows[k]].random(out=line)
-        chosen = np.array(drawn)
-        solved = place_many(*self._prepared, numbers, chosen, starts, goals, spheres)
-        for line, k, done in zip(numbers, drawn, solved, strict=True):
-            if not done:
-                draw(law, self._prepared, generators[rows[k]], starts[k], goals[k], spheres[k], line)
+    def show(self, rows: NDArray[np.int64]) -> None:
+        """Begin anew on the screen, where rows begin an episode."""
+        for row in rows.tolist():
+            self.screen.begin(row, self.episodes.rows, self.episodes.seen, self.spheres(row))
+
+    def render(self, row: int) -> NDArray[np.uint8] | None:
+        """Return a new picture of a row (height, width, 3), or None if there is none or it is shown in a window."""
+        return self.screen.render(row, self.episodes.rows, self.episodes.seen)

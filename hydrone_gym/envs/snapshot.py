@@ -1,11 +1,11 @@
 """A complete snapshot of an environment: enough to go on bit for bit, in this process or another."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
-from hydrone_gym.envs.egocentric_rows import EgocentricRows
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import Episodes
+from hydrone_gym.perception.egocentric import EgocentricRows
 from hydrone_gym.rendering.track import Track
 from hydrone_gym.world.scenario import Scenario
 
@@ -37,9 +37,8 @@ class Snapshot:
     def check_options(self, options: Options) -> None:
         """Raise ValueError naming every option in which another environment differs."""
         differing = [
-            f"{spec.name} (snapshot {getattr(self.options, spec.name)!r}, here {getattr(options, spec.name)!r})"
-            for spec in fields(Options)
-            if getattr(self.options, spec.name) != getattr(options, spec.name)
+            f"{name} (snapshot {getattr(self.options, name)!r}, here {getattr(options, name)!r})"
+            for name in self.options.differences(options)
         ]
         if differing:
             raise ValueError(f"snapshot is of an environment with other options: {', '.join(differing)}")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined
 
 BODY = 4  # numbers a body
+NOWHERE = (1e160, 0.0, 0.0, 0.0)  # a body that is not there: its square overflows, so its distance is infinite
 
 
 @inlined

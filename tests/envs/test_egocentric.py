@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, World
-from hydrone_gym.envs.egocentric import (
+from hydrone_gym.perception.egocentric import (
     NAMES,
     OBSERVATION_SIZE,
     Egocentric,
@@ -17,7 +17,7 @@ from hydrone_gym.envs.egocentric import (
     pack_egocentric,
     relative_action_space,
 )
-from hydrone_gym.envs.rays import REACH
+from hydrone_gym.perception.rays import REACH
 from hydrone_gym.simulation.simulation import Simulation
 from tests.envs.raw_observations import EGO, INDEX, VAST_EGO, WORLD, entry, extreme, random_raw, raw
 

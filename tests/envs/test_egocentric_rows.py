@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hydrone_gym.envs.egocentric import (
+from hydrone_gym.perception.egocentric import (
     OBSERVATION_SIZE,
     Egocentric,
     Memory,
@@ -24,7 +24,7 @@ def test_rows_and_raw_observations_agree_bit_for_bit(scenario):
     starts, least, clock = np.zeros((1, 3)), np.full(1, np.inf), np.zeros(1)
     out, place, memory = np.empty((1, OBSERVATION_SIZE), np.float32), np.empty((1, 4)), None
     for _ in range(40):
-        rows, known, found = env._episodes.rows, env._episodes.known, env._episodes.found
+        rows, known, found = env._core.episodes.rows, env._core.episodes.known, env._core.episodes.found
         observe_rows(rows, known, found, starts, least, clock, ego.values, 0, 1, out)
         flat, memory = ego.observe(observation, memory)
         assert same(flat, out[0])
