@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +16,9 @@ from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.requests import load_references
 from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
-from hydrone_gym.envs.task import OUTCOME, REPORT, Missions, begin_rows, new_episodes, pack_task, settle
+from hydrone_gym.envs.task import OUTCOME, Missions, begin_rows, for_part, new_episodes, pack_task, settle
 from hydrone_gym.perception.egocentric import EgocentricRows
-from hydrone_gym.perception.perceived import Perceived, perceive
+from hydrone_gym.perception.perceived import Perceived, copy_rows, perceive
 from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.block import LANES
 from hydrone_gym.simulation.outcome import RUNNING
@@ -31,35 +31,17 @@ from hydrone_gym.world.scenario import Scenario
 
 _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
 
-FLAT = ""  # key of an observation that is one array
 ReferenceFilter = Callable[[Perceived, NDArray[np.float64], NDArray[np.bool_]], NDArray[np.float64]]
 
 
-class Returned:
-    """What a step returns of all rows, in new arrays that are filled part by part.
+class Flown(NamedTuple):
+    """What a step leaves behind of all rows, in new arrays."""
 
-    `observations`; the report as `columns` (len(REPORT), n); `transitions` (n,), a list of crossings a row; and with
-    rows that began anew at once their last observation in `final` (n,).
-    """
-
-    def __init__(self, batch: "EpisodeBatch", *, observed: bool = True) -> None:
-        """Make room."""
-        self._batch = batch
-        self._shown = {key: np.empty_like(array, order="C") for key, array in batch.shown.items()} if observed else {}
-        self.columns = np.empty((len(REPORT), batch.count))
-        self.transitions, self.final = np.full((2, batch.count), None, dtype=object)
-
-    def fill(self, part: slice) -> None:
-        """Copy what a part of the rows shows now."""
-        for key, array in self._shown.items():
-            array[part] = self._batch.shown[key][part]
-        self.columns[:, part] = self._batch.episodes.report[part].T
-        self.transitions[part] = self._batch.transitions[part]
-
-    @property
-    def observations(self) -> Any:
-        """A dict of arrays with "world" rows, one array with "egocentric" ones."""
-        return self._shown.get(FLAT, self._shown)
+    report: NDArray[np.float64]  # (len(REPORT), n) of the period flown
+    now: NDArray[np.float64]  # the same, but of the next episode where that has begun at once
+    observation: Any  # as of now: a dict of arrays, or one array with interface="egocentric"
+    last_observations: np.ndarray  # (n,) object: an observation where an episode ended and the next has begun at once
+    last_transitions: np.ndarray  # (n,) object: its crossings
 
 
 class EpisodeBatch:
@@ -85,8 +67,8 @@ class EpisodeBatch:
         self.starting = np.zeros(count, bool)
         self.generators: list[np.random.Generator] = []
         self.reference_filter: ReferenceFilter | None = None
-        self._law = options.law
-        self._prepared = prepare(self._law, world, vehicle.radius)
+        self.law, self._obstacles = options.law, options.num_obstacles
+        self._prepared = prepare(self.law, world, vehicle.radius)
         self._task = pack_task(vehicle, world, options.time_limit, lanes)
         threads = max(1, min(threads, count // _ROWS_A_THREAD))
         self.simulations = [Simulation(vehicle, world, options.period, lanes) for _ in range(threads)]
@@ -105,7 +87,8 @@ class EpisodeBatch:
         """Make what shares memory with the episodes, and the threads."""
         now, lanes, threads = self.episodes, self.lanes, len(self.simulations)
         self.perceived = perceive(now.rows, now.known, now.found)
-        self.shown = self.perceived.observation() if self.egocentric is None else {FLAT: self.egocentric.seen}
+        self._raw = self.perceived.observation()
+        self._first = {key: array[0] for key, array in self._raw.items()}
         blocks = -(-self.count // lanes)
         edges = [lanes * round(blocks * k / threads) for k in range(threads)] + [self.count]
         self._parts = [slice(a, b) for a, b in pairwise(edges)]
@@ -113,11 +96,11 @@ class EpisodeBatch:
         self._flown = []
         for part in self._parts:
             own = slice(part.start // lanes, -(-part.stop // lanes))
-            self._flown.append((now.rows[part], now.obstacles[own], now.closest[own]))
+            self._flown.append((part, for_part(self._task, part), now.rows[part], now.obstacles[own], now.closest[own]))
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
-        shared = ("perceived", "shown", "_flown", "_pool")
+        shared = ("perceived", "_raw", "_first", "_flown", "_pool")
         return {name: value for name, value in self.__dict__.items() if name not in shared}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -128,7 +111,21 @@ class EpisodeBatch:
         """Return a new observation of a row."""
         if self.egocentric is not None:
             return self.egocentric.seen[row].copy()
-        return {key: array[row].copy() for key, array in self.shown.items()}
+        views = {key: array[row] for key, array in self._raw.items()} if row else self._first
+        return {key: array.copy() for key, array in views.items()}
+
+    def new_observation(self) -> Any:
+        """Return room for an observation of all rows."""
+        if self.egocentric is not None:
+            return np.empty(self.egocentric.seen.shape, np.float32)
+        return {key: np.empty(array.shape) for key, array in self._raw.items()}
+
+    def observe(self, part: slice, out: Any) -> None:
+        """Copy what a part of the rows shows now into an observation of all."""
+        if self.egocentric is not None:
+            out[part] = self.egocentric.seen[part]
+        else:
+            copy_rows(self.perceived.told, self.perceived.obstacles, part.start, part.stop, tuple(out.values()))
 
     def references(self, actions: ArrayLike) -> NDArray[np.float64]:
         """Return the references (n, 4) that actions stand for, as they are flown.
@@ -145,10 +142,10 @@ class EpisodeBatch:
 
     def advance(self, references: NDArray[np.float64], k: int = 0) -> None:
         """Fly part k of the rows one period toward references (n, 4), then judge them."""
-        part = self._parts[k]
-        rows, obstacles, closest = self._flown[k]
-        self.simulations[k].advance(rows, references[part], obstacles, closest, self.options.num_obstacles)
-        settle(self.episodes, self._task, part.start, part.stop)
+        part, task, rows, obstacles, closest = self._flown[k]
+        own = references if len(self._parts) == 1 else references[part]
+        self.simulations[k].advance(rows, own, obstacles, closest, self._obstacles)
+        settle(*self.episodes, task)
 
     def look(self, k: int = 0) -> None:
         """Look at part k of the rows, once a period."""
@@ -157,42 +154,44 @@ class EpisodeBatch:
 
     def note_crossings(self, part: slice) -> None:
         """Append the crossings of this period; lists handed out before are left alone."""
-        rows = part.start + np.flatnonzero(self.episodes.report[part, -1])
+        counts = self.episodes.report[-1, part]
+        rows = counts.nonzero()[0]
         if rows.size:
-            logs, counts = self.episodes.rows["crossing_log"][rows].tolist(), self.episodes.report[rows, -1].tolist()
-            for row, log, count in zip(rows.tolist(), logs, counts, strict=True):
+            logs = self.episodes.rows["crossing_log"][part][rows].tolist()
+            for row, log, count in zip((part.start + rows).tolist(), logs, counts[rows].tolist(), strict=True):
                 self.transitions[row] = [*self.transitions[row], *crossings_of(log, int(count))]
 
-    def fly(self, references: NDArray[np.float64], *, same_step: bool) -> tuple[Returned, Returned]:
+    def fly(self, references: NDArray[np.float64], *, same_step: bool) -> Flown:
         """Fly one period toward references (n, 4); rows that had ended before begin anew instead.
 
-        With `same_step`, rows that end now begin anew at once. Returns what there is then, and what there was before,
-        without observations but the final ones; else twice the same.
+        With `same_step`, rows that end now begin anew at once.
         """
-        now = Returned(self)
-        before = Returned(self, observed=False) if same_step else now
         self.starting[:] = False
-        self._spread(lambda k: self._fly_part(k, references, now, before))
-        return now, before
+        before = np.empty_like(self.episodes.report) if same_step else None
+        observations, crossings = np.full((2, self.count), None, dtype=object) if same_step else (None, None)
+        observation = self.new_observation()
 
-    def _fly_part(self, k: int, references: NDArray[np.float64], now: Returned, before: Returned) -> None:
-        part = self._parts[k]
-        self.advance(references, k)
-        self.note_crossings(part)
-        again = part.start + np.flatnonzero(self.ended[part])
-        if again.size:
-            self.begin(again, look=False)
-        self.look(k)
-        outcome = self.episodes.report[part, OUTCOME]
-        if before is not now:
-            before.fill(part)
-            again = part.start + np.flatnonzero(outcome != RUNNING)
-            for row in again.tolist():
-                before.final[row] = self.observation_of(row)
+        def work(k: int) -> None:
+            part = self._parts[k]
+            self.advance(references, k)
+            self.note_crossings(part)
+            again = self.ended[part].nonzero()[0]
             if again.size:
-                self.begin(again)
-        now.fill(part)
-        self.ended[part] = outcome != RUNNING
+                self.begin(part.start + again, look=False)
+            self.look(k)
+            np.not_equal(self.episodes.report[OUTCOME, part], RUNNING, out=self.ended[part])
+            if before is not None:
+                before[:, part] = self.episodes.report[:, part]
+                again = part.start + self.ended[part].nonzero()[0]
+                for row in again.tolist():
+                    observations[row], crossings[row] = self.observation_of(row), self.transitions[row]
+                if again.size:
+                    self.begin(again)
+            self.observe(part, observation)
+
+        self._spread(work)
+        now = self.episodes.report.copy()
+        return Flown(now if before is None else before, now, observation, observations, crossings)
 
     def _spread(self, work: Callable[[int], None]) -> None:
         """Do every part's work, the first of them in this thread."""
@@ -236,7 +235,7 @@ class EpisodeBatch:
         """Draw scenarios, each from its row's own stream: one kernel call places all, the rare rest goes one by one."""
         if not drawn:
             return
-        law, generators = self._law, [self.generators[row] for row in rows[drawn].tolist()]
+        law, generators = self.law, [self.generators[row] for row in rows[drawn].tolist()]
         numbers = np.empty((len(drawn), first_numbers(law)))
         for generator, line in zip(generators, numbers, strict=True):
             generator.random(out=line)

@@ -14,7 +14,8 @@ from hydrone_gym.envs.options import Options, known_options, takes, with_options
 from hydrone_gym.envs.requests import check_running, check_scenario, load_reference, requested_scenario
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.snapshot import Snapshot
-from hydrone_gym.envs.task import Episodes
+from hydrone_gym.envs.task import OUTCOME, Episodes
+from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.generator import generate
@@ -110,6 +111,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         self.action_space, self.observation_space = self._core.action_space, self._core.observation_space
         self._reference = np.zeros((1, 4))
         self._scenario: Scenario | None = None
+        self._outcome: float | None = None  # a plain number: comparing with the enumeration takes microseconds
 
     @property
     def simulation(self) -> Simulation:
@@ -146,13 +148,13 @@ class HydroneEnv(gym.Env[Any, Any]):
         super().reset(seed=seed)
         core, scenario = self._core, requested_scenario(options)
         if scenario is None:
-            scenario = generate(self.options.law, self.world, self.vehicle.radius, self.np_random)
+            scenario = generate(core.law, self.world, self.vehicle.radius, self.np_random)
         else:
             check_scenario(scenario, self.world, self.vehicle.radius, core.sphere_space)
         core.begin(_ONLY, [scenario])
-        self._scenario = scenario
-        core.show(_ONLY)
-        return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0])
+        self._scenario, self._outcome = scenario, RUNNING
+        core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
+        return core.observation_of(0), info_of(core.episodes.report[:, 0].tolist(), core.transitions[0])
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period with the reference moving to the action; returns are those of the class's description.
@@ -166,7 +168,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         """
         core = self._core
         now, screen = core.episodes, core.screen
-        check_running(now.rows["outcome"][0], self._scenario is not None)
+        check_running(self._outcome)
         if core.egocentric is None:
             references = self._reference
             load_reference(action, core.low, core.high, references[0])
@@ -176,9 +178,10 @@ class HydroneEnv(gym.Env[Any, Any]):
         core.advance(references)
         core.look()
         screen.update(now.rows, now.seen)
-        report = now.report[0].tolist()
+        report = now.report[:, 0].tolist()
         if report[-1] > 0.0:
             core.note_crossings(slice(0, 1))
+        self._outcome = report[OUTCOME]
         info = info_of(report, core.transitions[0])
         terminated, truncated = conclude(info)
         return core.observation_of(0), report[len(TERMS)], terminated, truncated, info
@@ -214,6 +217,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             raise TypeError(f"snapshot must come from get_state(), got {type(snapshot).__name__}")
         snapshot.check_options(self.options)
         core, self._scenario = self._core, snapshot.scenario
+        self._outcome = float(snapshot.episodes.report[OUTCOME, 0])
         for own, kept in zip(core.episodes, snapshot.episodes, strict=True):
             own[...] = kept
         if core.egocentric is not None and snapshot.egocentric is not None:

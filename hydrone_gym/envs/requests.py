@@ -79,11 +79,11 @@ def check_scenario(scenario: Scenario, world: World, vehicle_radius: float, boun
             raise ValueError(f"obstacle {index} must lie between {low} and {high} (m), got {sphere.tolist()}")
 
 
-def check_running(outcome: float, begun: bool) -> None:
-    """Raise ResetNeeded unless an episode has begun and not ended."""
-    if not begun:
+def check_running(outcome: float | None) -> None:
+    """Raise ResetNeeded unless an episode has begun (None: it has not) and not ended."""
+    if outcome is None:
         raise ResetNeeded("step() was called before reset(): call reset() first")
-    if outcome != RUNNING:  # a plain number: comparing with the enumeration takes microseconds
+    if outcome != RUNNING:
         raise ResetNeeded(
             f"step() was called after the episode ended with {Outcome(int(outcome)).name}: call reset() first"
         )

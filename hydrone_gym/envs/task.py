@@ -18,8 +18,8 @@ from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.bodies import segment_distance
 from hydrone_gym.world.world import World
 
-# What is reported of each row, one column each.
-REPORT = (*TERMS, "reward", "outcome", "time", "energy", "clearance", "crossings")
+# What is reported of each row, one line each.
+REPORT = (*TERMS, "reward", "outcome", "time", "energy", "clearance", "time_to_go", "crossings")
 OUTCOME = REPORT.index("outcome")
 
 
@@ -29,11 +29,10 @@ class Episodes(NamedTuple):
     rows: np.ndarray  # (n,) dtype ROW
     obstacles: NDArray[np.float64]  # (blocks, 4 * M * lanes) spheres, m; `NOWHERE` beyond those of the scenario
     closest: NDArray[np.float64]  # (blocks, M * lanes) least distance so far to each surface, m
-    potential: NDArray[np.float64]  # (n,) time-to-go at the end of the last period, s
     seen: NDArray[np.uint8]  # (n, M) 1 for a detected obstacle
     found: NDArray[np.int64]  # (n,) number of detected obstacles
     known: NDArray[np.float64]  # (n, M, 4) detected spheres in order of detection, m
-    report: NDArray[np.float64]  # (n, len(REPORT)) of the last period
+    report: NDArray[np.float64]  # (len(REPORT), n) of the last period; times in s
 
 
 class Missions(NamedTuple):
@@ -51,17 +50,18 @@ def new_episodes(count: int, obstacles: int, lanes: int) -> Episodes:
         new_rows(count),
         np.zeros((blocks, 4 * obstacles * lanes)),
         np.zeros((blocks, obstacles * lanes)),
-        np.zeros(count),
         np.zeros((count, obstacles), np.uint8),
         np.zeros(count, np.int64),
         np.zeros((count, obstacles, 4)),
-        np.zeros((count, len(REPORT))),
+        np.zeros((len(REPORT), count)),
     )
 
 
 class TaskParams(NamedTuple):
     """The constants of a task; far fewer than a `Model`, which would add a second to the first compilation."""
 
+    first: int  # rows [first, last) are settled
+    last: int
     lanes: int  # rows a block
     radius: float  # m
     sensor_range: float  # m
@@ -71,14 +71,22 @@ class TaskParams(NamedTuple):
 
 def pack_task(vehicle: Vehicle, world: World, time_limit: float, lanes: int) -> NDArray[np.float64]:
     """Flatten the constants of a task with a time limit in s to one array, which reaches a kernel fastest."""
-    speeds = cruise_speeds(envelope_of(vehicle))
-    return np.array([lanes, vehicle.radius, world.sensor_range, math.ceil(time_limit / TICK - 1e-9), *speeds])
+    limit = math.ceil(time_limit / TICK - 1e-9)
+    return np.array(
+        [0.0, 0.0, lanes, vehicle.radius, world.sensor_range, limit, *cruise_speeds(envelope_of(vehicle))]
+    )
+
+
+def for_part(values: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
+    """Return packed constants with which `settle` settles a part of the rows."""
+    return np.append([part.start, part.stop], values[2:])
 
 
 @inlined
 def _unpack_task(v):
     """Rebuild the `TaskParams` of a packed array inside a kernel."""
-    return TaskParams(int(v[0]), v[1], v[2], v[3], CruiseSpeeds(v[4], v[5], v[6], v[7], v[8]))
+    speeds = CruiseSpeeds(v[6], v[7], v[8], v[9], v[10])
+    return TaskParams(int(v[0]), int(v[1]), int(v[2]), v[3], v[4], v[5], speeds)
 
 
 @inlined
@@ -130,27 +138,27 @@ def _judge(now, n, params):
         row.outcome = TIMEOUT
     s = row.state
     after = _potential_of(row, params.speeds)
-    write_reward(report[n], now.potential[n], after, (s[6], s[7], s[8]), row.outcome)
-    now.potential[n] = after
-    report[n, OUTCOME] = row.outcome
-    report[n, OUTCOME + 1] = row.ticks * TICK
-    report[n, OUTCOME + 2] = row.energy
-    report[n, OUTCOME + 3] = row.clearance
-    report[n, OUTCOME + 4] = row.crossings
+    write_reward(report, n, report[OUTCOME + 4, n], after, (s[6], s[7], s[8]), row.outcome)
+    report[OUTCOME, n] = row.outcome
+    report[OUTCOME + 1, n] = row.ticks * TICK
+    report[OUTCOME + 2, n] = row.energy
+    report[OUTCOME + 3, n] = row.clearance
+    report[OUTCOME + 4, n] = after
+    report[OUTCOME + 5, n] = row.crossings
     row.crossings = 0.0
 
 
 @kernel
-def settle(now, values, first, last):
-    """Settle rows [first, last) after a period: reward, sensing, report.
+def settle(rows, obstacles, closest, seen, found, known, report, values):
+    """Settle a part of the rows after a period: reward, sensing, report.
 
     Args:
-        now: `Episodes`, updated; the crossings in its report are those of this period.
-        values: from `pack_task`.
-        first, last: which rows.
+        rows, obstacles, closest, seen, found, known, report: `Episodes`, updated; one by one they reach a kernel in half
+            the time that the tuple takes. The crossings reported are those of this period.
+        values: from `for_part`.
     """
-    params = _unpack_task(values)
-    for n in range(first, last):
+    now, params = Episodes(rows, obstacles, closest, seen, found, known, report), _unpack_task(values)
+    for n in range(params.first, params.last):
         _judge(now, n, params)
         detect(now, n, params.lanes, params.sensor_range)
 
@@ -170,8 +178,8 @@ def begin_rows(now, missions, order, values):
         n = order[k]
         _place_row(now.rows[n], missions, k)
         _surround(now, n, missions, k, params)
-        now.potential[n] = _potential_of(now.rows[n], params.speeds)
+        now.report[OUTCOME + 4, n] = _potential_of(now.rows[n], params.speeds)
         _judge(now, n, params)
         for term in range(OUTCOME):
-            now.report[n, term] = 0.0
+            now.report[term, n] = 0.0
         detect(now, n, params.lanes, params.sensor_range)

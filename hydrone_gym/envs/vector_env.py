@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from hydrone_gym.envs.batch import EpisodeBatch, ReferenceFilter, Returned
+from hydrone_gym.envs.batch import EpisodeBatch, ReferenceFilter
 from hydrone_gym.envs.info import batch_info
 from hydrone_gym.envs.options import VectorOptions, takes, with_options
 from hydrone_gym.envs.requests import check_scenario, requested_rows
@@ -95,12 +95,13 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
                 check_scenario(scenario, simulation.world, simulation.vehicle.radius, self._core.sphere_space)
         self._seed(seed, rows)
         self._core.begin(rows, scenarios)
-        self._show(rows)
+        if self.render_mode is not None:
+            self._core.show(rows)
         mask = np.zeros(self.num_envs, bool)
         mask[rows] = True
-        now = Returned(self._core)
-        now.fill(slice(0, self.num_envs))
-        return now.observations, batch_info(now.columns, now.transitions, mask)
+        observation = self._core.new_observation()
+        self._core.observe(slice(0, self.num_envs), observation)
+        return observation, batch_info(self._core.episodes.report, self._core.transitions, mask)
 
     def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
@@ -113,10 +114,6 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         for row in rows:
             if seeds[row] is not None:
                 streams[row] = seeding.np_random(seeds[row])[0]
-
-    def _show(self, rows: NDArray[np.int64]) -> None:
-        if self.render_mode is not None:
-            self._core.show(rows)
 
     def step(
         self, actions: ArrayLike
@@ -143,19 +140,20 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         if self.render_mode is not None:
             for row in range(self.num_envs):
                 core.screen.add(row, core.episodes.rows, references)
-        now, before = core.fly(references, same_step=same_step)
-        self._show(np.flatnonzero(core.starting))
-        outcome = before.columns[OUTCOME]
+        flown = core.fly(references, same_step=same_step)
+        if self.render_mode is not None:
+            core.show(core.starting.nonzero()[0])
+        outcome = flown.report[OUTCOME]
         truncated, ended = outcome == TIMEOUT, outcome != RUNNING
-        info = batch_info(now.columns, now.transitions)
+        info = batch_info(flown.now, core.transitions)
         if ended.any():
             success = {"is_success": outcome == GOAL, "_is_success": ended.copy()}
             if same_step:
-                last = batch_info(before.columns, before.transitions, ended) | success
-                success = {"final_obs": before.final, "_final_obs": ended.copy()}
+                last = batch_info(flown.report, flown.last_transitions, ended) | success
+                success = {"final_obs": flown.last_observations, "_final_obs": ended.copy()}
                 success |= {"final_info": last, "_final_info": ended.copy()}
             info |= success
-        return now.observations, before.columns[_REWARD].copy(), ended & ~truncated, truncated, info
+        return flown.observation, flown.report[_REWARD].copy(), ended & ~truncated, truncated, info
 
     def render(self) -> tuple[RenderFrame, ...] | None:
         """Return a new picture (height, width, 3) of each row, None without a `render_mode`.

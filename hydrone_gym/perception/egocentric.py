@@ -83,6 +83,7 @@ NAMES = (
 OBSERVATION_SIZE = len(NAMES)
 _RAYS = NAMES.index(RAY_NAMES[0])
 _CLOCK = NAMES.index("clock")
+_LEAST = 3  # column of a memory, after the start and before the clock
 _COARSE, _HEIGHT, _ANGLE, _WALL, _PERIODS = 1.0 / 5.0, 1.0 / 3.0, 3.0, 1.0 / 5.0, 1.0 / 10.0
 
 
@@ -138,23 +139,23 @@ def _write_vehicle(out, told, frame, p):
 
 
 @inlined
-def _remember(memory, n, state, goal, speeds):
-    """Move row n's memory on by a period; its start and clock are set where an episode begins."""
-    if memory.least[n] == np.inf:
+def _remember(memory, state, goal, speeds):
+    """Move a row's memory on by a period; its start and clock are set where an episode begins."""
+    if memory[_LEAST] == np.inf:
         for c in range(3):
-            memory.start[n, c] = state[c]
+            memory[c] = state[c]
     remaining = time_to_go(state[0], state[1], state[2], goal[0], goal[1], goal[2], speeds)
-    memory.clock[n] = 0.0 if remaining < memory.least[n] else memory.clock[n] + 1.0
-    memory.least[n] = remaining if remaining < memory.least[n] else memory.least[n]
+    memory[_LEAST + 1] = 0.0 if remaining < memory[_LEAST] else memory[_LEAST + 1] + 1.0
+    memory[_LEAST] = remaining if remaining < memory[_LEAST] else memory[_LEAST]
 
 
 @kernel
-def observe_rows(perceived, memory, order, values, seen):
+def observe_rows(told, obstacles, found, memory, order, values, seen):
     """Write observations and move their memory on: once a period, neither more nor less.
 
     Args:
-        perceived: n rows, `Perceived`.
-        memory: `Memory` of n rows, updated; least = infinity where an episode begins.
+        told, obstacles, found: fields of a `Perceived`.
+        memory: (n, 5) a `Memory` a row, updated.
         order: (k,) int64, which rows.
         values: from `pack_egocentric`.
         seen: (n, OBSERVATION_SIZE) float32, those rows written.
@@ -162,17 +163,22 @@ def observe_rows(perceived, memory, order, values, seen):
     params = unpack_egocentric(values)
     for k in range(order.size):
         n = order[k]
-        told, out, spheres, count = perceived.told[n], seen[n], perceived.obstacles[n], perceived.found[n]
-        s, goal = told.state, told.goal
-        _remember(memory, n, s, goal, params.speeds)
-        frame = mission_frame(memory.start[n, 0], memory.start[n, 1], goal[0], goal[1])
-        _write_vehicle(out, told, frame, params)
+        row, own, spheres, out = told[n], memory[n], obstacles[n], seen[n]
+        s, goal = row.state, row.goal
+        _remember(own, s, goal, params.speeds)
+        frame = mission_frame(own[0], own[1], goal[0], goal[1])
+        _write_vehicle(out, row, frame, params)
         place = (s[0], s[1], s[2])
-        cast_fixed(out, _RAYS, place, frame, spheres, count, params)
+        cast_fixed(out, _RAYS, place, frame, spheres, found[n], params)
         ahead = (goal[0] - s[0], goal[1] - s[1], goal[2] - s[2])
-        out[_RAYS + FIXED] = cast_along(place, ahead, spheres, count, params)
-        out[_RAYS + FIXED + 1] = cast_along(place, (s[6], s[7], s[8]), spheres, count, params)
-        out[_CLOCK] = _clip(_PERIODS * memory.clock[n])
+        out[_RAYS + FIXED] = cast_along(place, ahead, spheres, found[n], params)
+        out[_RAYS + FIXED + 1] = cast_along(place, (s[6], s[7], s[8]), spheres, found[n], params)
+        out[_CLOCK] = _clip(_PERIODS * own[_LEAST + 1])
+
+
+def _new_memory(count: int) -> NDArray[np.float64]:
+    """Return the memory of rows whose episode begins: a line of start (3), least and clock each."""
+    return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
 class EgocentricRows:
@@ -184,21 +190,20 @@ class EgocentricRows:
     def __init__(self, vehicle: Vehicle, world: World, count: int) -> None:
         """Make room for the rows."""
         self._values = pack_egocentric(vehicle, world)
-        self.memory = Memory(np.zeros((count, 3)), np.full(count, np.inf), np.zeros(count))
+        self.memory = _new_memory(count)
         self.seen = np.zeros((count, OBSERVATION_SIZE), np.float32)
 
     def begin(self, rows: NDArray[np.int64]) -> None:
         """Forget: at the next look an episode begins in these rows."""
-        self.memory.least[rows] = np.inf
+        self.memory[rows, _LEAST] = np.inf
 
     def look(self, perceived: Perceived, rows: NDArray[np.int64]) -> None:
         """Look at rows (k,) after a period."""
-        observe_rows(perceived, self.memory, rows, self._values, self.seen)
+        observe_rows(*perceived, self.memory, rows, self._values, self.seen)
 
     def restore(self, kept: "EgocentricRows") -> None:
         """Go back to what a copy holds, in this memory."""
-        for own, other in zip((*self.memory, self.seen), (*kept.memory, kept.seen), strict=True):
-            own[...] = other
+        self.memory[:], self.seen[:] = kept.memory, kept.seen
 
     def references(self, actions: ArrayLike, perceived: Perceived) -> NDArray[np.float64]:
         """Return the references (n, 4) of relative actions (n, 3), which are clipped to [-1, 1].
@@ -214,7 +219,7 @@ class EgocentricRows:
             bad = np.flatnonzero(~finite.all(axis=1)).tolist()
             raise ValueError(f"actions must be finite offsets in [-1, 1]; rows {bad} are not")
         out = np.empty((count, 4))
-        place_references(perceived, wanted, self.memory.start, self._values, out)
+        place_references(perceived.told, wanted, self.memory, self._values, out)
         return out
 
 
@@ -247,15 +252,17 @@ class Egocentric:
         """
         perceived, single = _load(observation)
         count = len(perceived.told)
-        memories = Memory(np.zeros((count, 3)), np.full(count, np.inf), np.zeros(count))
+        memories, out = _new_memory(count), np.empty((count, OBSERVATION_SIZE), np.float32)
         if memory is not None:
-            for name, own, given in zip(Memory._fields, memories, memory):
+            parts = (memories[:, :_LEAST], memories[:, _LEAST], memories[:, _LEAST + 1])
+            for name, own, given in zip(Memory._fields, parts, memory):
                 own[:] = _shaped(f"memory.{name}", given, own.shape, single)
         if starting is not None:
-            memories.least[_shaped("starting", starting, (count,), single) != 0.0] = np.inf
-        out = np.empty((count, OBSERVATION_SIZE), np.float32)
-        observe_rows(perceived, memories, np.arange(count), self.values, out)
-        return (out[0], Memory(*(own[0] for own in memories))) if single else (out, memories)
+            memories[_shaped("starting", starting, (count,), single) != 0.0, _LEAST] = np.inf
+        observe_rows(*perceived, memories, np.arange(count), self.values, out)
+        if single:
+            memories, out = memories[0], out[0]
+        return out, Memory(memories[..., :_LEAST].copy(), *memories[..., _LEAST:].T.copy())
 
     def reference(self, action: ArrayLike, observation: RawObservation, memory: Memory) -> NDArray[np.float32]:
         """Return the raw action, (4,) or (n, 4) float32 in m, m, m, rad, that a relative action stands for.
@@ -275,7 +282,7 @@ class Egocentric:
             raise ValueError(f"action must be finite, got {action!r}")
         starts = np.ascontiguousarray(_shaped("memory.start", memory.start, (count, 3), single))
         out = np.empty((count, 4))
-        place_references(perceived, np.ascontiguousarray(wanted, np.float32), starts, self.values, out)
+        place_references(perceived.told, np.ascontiguousarray(wanted, np.float32), starts, self.values, out)
         return (out[0] if single else out).astype(np.float32)
 
 

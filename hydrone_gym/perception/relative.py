@@ -69,21 +69,21 @@ def _unit(value):
 
 
 @kernel
-def place_references(perceived, actions, starts, values, out):
+def place_references(told, actions, memory, values, out):
     """Turn relative actions into references.
 
     Args:
-        perceived: n rows, `Perceived`.
+        told: (n,) as in `Perceived`.
         actions: (n, 3) float32 offsets in the mission frame, clipped to [-1, 1].
-        starts: (n, 3) where the episodes started, m.
+        memory: (n, 3 or more) where the episodes started, x, y, z in m.
         values: from `pack_egocentric`.
         out: (n, 4) float64 m, m, m, rad, written; every number is a float32.
     """
     p = unpack_egocentric(values)
     for n in range(out.shape[0]):
-        row = perceived.told[n]
+        row = told[n]
         s, goal = row.state, row.goal
-        cosine, sine = mission_frame(starts[n, 0], starts[n, 1], goal[0], goal[1])
+        cosine, sine = mission_frame(memory[n, 0], memory[n, 1], goal[0], goal[1])
         ahead = STEP[0] * _unit(np.float64(actions[n, 0]))
         left = STEP[1] * _unit(np.float64(actions[n, 1]))
         out[n, 0] = _inside(s[0] + (cosine * ahead - sine * left), p.x_min, p.x_max)
