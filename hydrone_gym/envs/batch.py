@@ -212,18 +212,18 @@ class EpisodeBatch:
             scenarios: (k,) what to fly; None draws one from the row's own random stream.
             look: whether to look at them, as is to be done once a period.
         """
-        count = self.options.num_obstacles
-        missions = Missions(np.empty((len(rows), 4)), np.empty((len(rows), 3)), np.empty((len(rows), count, 4)))
-        chosen = [None] * len(rows) if scenarios is None else scenarios
-        self._draw(rows, [k for k, scenario in enumerate(chosen) if scenario is None], missions)
-        for k, scenario in enumerate(chosen):
-            if scenario is not None:
-                given = len(scenario.obstacles)
-                missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
-                missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
-                missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE
+        count, listed = len(rows), rows.tolist()
+        missions = Missions(np.empty((count, 4)), np.empty((count, 3)), np.empty((count, self._obstacles, 4)))
+        drawn = np.arange(count)
+        if scenarios is not None:
+            drawn = np.array([k for k, scenario in enumerate(scenarios) if scenario is None], np.int64)
+            for k, scenario in enumerate(scenarios):
+                if scenario is not None:
+                    _load(scenario, k, missions)
+        if drawn.size:
+            self._draw([self.generators[listed[k]] for k in drawn], drawn, missions)
         begin_rows(self.episodes, missions, rows, self._task)
-        for row in rows.tolist():
+        for row in listed:
             self.transitions[row] = []
         self.ended[rows], self.starting[rows] = False, True
         if self.egocentric is not None:
@@ -231,18 +231,16 @@ class EpisodeBatch:
             if look:
                 self.egocentric.look(self.perceived, rows)
 
-    def _draw(self, rows: NDArray[np.int64], drawn: list[int], missions: Missions) -> None:
-        """Draw scenarios, each from its row's own stream: one kernel call places all, the rare rest goes one by one."""
-        if not drawn:
-            return
-        law, generators = self.law, [self.generators[row] for row in rows[drawn].tolist()]
-        numbers = np.empty((len(drawn), first_numbers(law)))
-        for generator, line in zip(generators, numbers, strict=True):
+    def _draw(self, generators: list[np.random.Generator], drawn: NDArray[np.int64], missions: Missions) -> None:
+        """Draw missions, each from its own stream: one kernel call places all, the rare rest goes one by one."""
+        numbers = np.empty((len(drawn), first_numbers(self.law)))
+        for generator, line in zip(generators, numbers):
             generator.random(out=line)
-        solved = place_many(*self._prepared, numbers, np.array(drawn), *missions)
-        for i in np.flatnonzero(~solved).tolist():
-            own = (array[drawn[i]] for array in missions)
-            draw(law, self._prepared, generators[i], *own, numbers[i])
+        solved = place_many(*self._prepared, numbers, drawn, *missions)
+        if not solved.all():
+            for i in np.flatnonzero(~solved).tolist():
+                own = [array[drawn[i]] for array in missions]
+                draw(self.law, self._prepared, generators[i], *own, numbers[i])
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""
@@ -258,3 +256,11 @@ class EpisodeBatch:
     def render(self, row: int) -> NDArray[np.uint8] | None:
         """Return a new picture of a row (height, width, 3), or None if there is none or it is shown in a window."""
         return self.screen.render(row, self.episodes.rows, self.episodes.seen)
+
+
+def _load(scenario: Scenario, k: int, missions: Missions) -> None:
+    """Make a scenario the k-th mission, with nothing in the place of the spheres it lacks."""
+    given = len(scenario.obstacles)
+    missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
+    missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
+    missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE
