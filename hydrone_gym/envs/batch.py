@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
-from hydrone_gym.envs.requests import load_references
+from hydrone_gym.envs.requests import REFERENCE, checked
 from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
 from hydrone_gym.envs.task import OUTCOME, Missions, begin_rows, for_part, new_episodes, pack_task, settle
-from hydrone_gym.perception.egocentric import EgocentricRows
+from hydrone_gym.perception.egocentric import LEAST, OBSERVATION_SIZE, Egocentric, new_memory
 from hydrone_gym.perception.perceived import Perceived, copy_rows, perceive
 from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.block import LANES
@@ -75,7 +75,8 @@ class EpisodeBatch:
         self.screen = new_screen(
             options.render_mode, options.render_size, options.camera, self.simulations[0], render_modes
         )
-        self.egocentric = EgocentricRows(vehicle, world, count) if options.interface == "egocentric" else None
+        self.egocentric = Egocentric(self.simulations[0]) if options.interface == "egocentric" else None
+        self.memory, self.seen = new_memory(count), np.zeros((count, OBSERVATION_SIZE), np.float32)  # if egocentric
         references, raw = action_space(world), observation_space(vehicle, world, options.num_obstacles)
         self.sphere_space: Any = raw["obstacles"]
         self.action_space = references if self.egocentric is None else relative_action_space()
@@ -110,20 +111,20 @@ class EpisodeBatch:
     def observation_of(self, row: int) -> Any:
         """Return a new observation of a row."""
         if self.egocentric is not None:
-            return self.egocentric.seen[row].copy()
+            return self.seen[row].copy()
         views = {key: array[row] for key, array in self._raw.items()} if row else self._first
         return {key: array.copy() for key, array in views.items()}
 
     def new_observation(self) -> Any:
         """Return room for an observation of all rows."""
         if self.egocentric is not None:
-            return np.empty(self.egocentric.seen.shape, np.float32)
+            return np.empty(self.seen.shape, np.float32)
         return {key: np.empty(array.shape) for key, array in self._raw.items()}
 
     def observe(self, part: slice, out: Any) -> None:
         """Copy what a part of the rows shows now into an observation of all."""
         if self.egocentric is not None:
-            out[part] = self.egocentric.seen[part]
+            out[part] = self.seen[part]
         else:
             copy_rows(self.perceived.told, self.perceived.obstacles, part.start, part.stop, tuple(out.values()))
 
@@ -133,9 +134,11 @@ class EpisodeBatch:
         Raises ValueError for actions of another shape or that are not finite.
         """
         if self.egocentric is None:
-            references = load_references(actions, self.low, self.high, self.count)
+            given = checked(actions, (self.count, 4), REFERENCE, np.float64)
+            references = np.minimum(np.maximum(given, self.low), self.high)
         else:
-            references = self.egocentric.references(actions, self.perceived)
+            offsets = checked(actions, (self.count, 3), "offsets in [-1, 1]", np.float32)
+            references = self.egocentric.place(self.perceived, self.memory, offsets)
         if self.reference_filter is not None:
             references = self.reference_filter(self.perceived, references, self.starting.copy())
         return references
@@ -147,10 +150,10 @@ class EpisodeBatch:
         self.simulations[k].advance(rows, own, obstacles, closest, self._obstacles)
         settle(*self.episodes, task)
 
-    def look(self, k: int = 0) -> None:
-        """Look at part k of the rows, once a period."""
+    def look(self, rows: NDArray[np.int64]) -> None:
+        """Look at rows (k,), once a period."""
         if self.egocentric is not None:
-            self.egocentric.look(self.perceived, self._orders[k])
+            self.egocentric.look(self.perceived, self.memory, rows, self.seen)
 
     def note_crossings(self, part: slice) -> None:
         """Append the crossings of this period; lists handed out before are left alone."""
@@ -178,7 +181,7 @@ class EpisodeBatch:
             again = self.ended[part].nonzero()[0]
             if again.size:
                 self.begin(part.start + again, look=False)
-            self.look(k)
+            self.look(self._orders[k])
             np.not_equal(self.episodes.report[OUTCOME, part], RUNNING, out=self.ended[part])
             if before is not None:
                 before[:, part] = self.episodes.report[:, part]
@@ -226,10 +229,9 @@ class EpisodeBatch:
         for row in listed:
             self.transitions[row] = []
         self.ended[rows], self.starting[rows] = False, True
-        if self.egocentric is not None:
-            self.egocentric.begin(rows)
-            if look:
-                self.egocentric.look(self.perceived, rows)
+        self.memory[rows, LEAST] = np.inf
+        if look:
+            self.look(rows)
 
     def _draw(self, generators: list[np.random.Generator], drawn: NDArray[np.int64], missions: Missions) -> None:
         """Draw missions, each from its own stream: one kernel call places all, the rare rest goes one by one."""

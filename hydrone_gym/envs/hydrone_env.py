@@ -176,7 +176,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             references = core.references(np.asarray(action)[None])
         screen.add(0, now.rows, references)
         core.advance(references)
-        core.look()
+        core.look(_ONLY)
         screen.update(now.rows, now.seen)
         report = now.report[:, 0].tolist()
         if report[-1] > 0.0:
@@ -204,7 +204,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             transitions=tuple(dict(crossing) for crossing in core.transitions[0]),
             random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
             seed=self._np_random_seed,
-            egocentric=copy.deepcopy(core.egocentric),
+            egocentric=(core.memory.copy(), core.seen.copy()),
             track=core.screen.track(0),
         )
 
@@ -218,10 +218,9 @@ class HydroneEnv(gym.Env[Any, Any]):
         snapshot.check_options(self.options)
         core, self._scenario = self._core, snapshot.scenario
         self._outcome = float(snapshot.episodes.report[OUTCOME, 0])
-        for own, kept in zip(core.episodes, snapshot.episodes, strict=True):
+        kept_arrays = (*snapshot.episodes, *snapshot.egocentric)
+        for own, kept in zip((*core.episodes, core.memory, core.seen), kept_arrays, strict=True):
             own[...] = kept
-        if core.egocentric is not None and snapshot.egocentric is not None:
-            core.egocentric.restore(snapshot.egocentric)
         core.transitions[0] = [dict(crossing) for crossing in snapshot.transitions]
         self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
         self._np_random_seed = snapshot.seed

@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import Episodes
-from hydrone_gym.perception.egocentric import EgocentricRows
 from hydrone_gym.rendering.track import Track
 from hydrone_gym.world.scenario import Scenario
 
@@ -21,7 +23,7 @@ class Snapshot:
         transitions: the crossings so far.
         random_state: state of the bit generator that draws scenarios.
         seed: the seed it was made from.
-        egocentric: the memory of `interface="egocentric"`, else None.
+        egocentric: memory and last observation of `interface="egocentric"`.
         track: the path flown so far, for pictures; None from an environment without `render_mode`.
     """
 
@@ -31,7 +33,7 @@ class Snapshot:
     transitions: tuple[dict[str, Any], ...]
     random_state: dict[str, Any]
     seed: int | None
-    egocentric: EgocentricRows | None
+    egocentric: tuple[NDArray[np.float64], NDArray[np.float32]]
     track: Track | None = None
 
     def check_options(self, options: Options) -> None:

@@ -1,8 +1,8 @@
 """The egocentric interface: what a learner wants to see and to say, made from what `interface="world"` gives.
 
-One set of kernels reads what is `Perceived`, be it an environment's rows (`EgocentricRows`) or a raw observation
-(`Egocentric`): a policy trained here flies through the raw interface with the same numbers bit for bit. Besides the raw
-observation it needs what a policy can carry itself (`Memory`): where the episode started and how progress goes.
+One set of kernels reads what is `Perceived`, be it of an environment's rows or of a raw observation: a policy trained
+here flies through the raw interface with the same numbers bit for bit. Besides the raw observation it needs what a
+policy can carry itself (`Memory`): where the episode started and how progress goes.
 
 **Mission frame.** x' points horizontally from the episode's start to its goal, y' to its left, z up; it stays as it is
 for the whole episode. If the goal lies straight above or below the start, x' is the world's x. Every horizontal vector
@@ -54,8 +54,6 @@ from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import time_to_go
 from hydrone_gym.surface import is_air
-from hydrone_gym.vehicle import Vehicle
-from hydrone_gym.world.world import World
 
 RawObservation = Mapping[str, NDArray]
 
@@ -83,7 +81,7 @@ NAMES = (
 OBSERVATION_SIZE = len(NAMES)
 _RAYS = NAMES.index(RAY_NAMES[0])
 _CLOCK = NAMES.index("clock")
-_LEAST = 3  # column of a memory, after the start and before the clock
+LEAST = 3  # column of a memory, after the start and before the clock
 _COARSE, _HEIGHT, _ANGLE, _WALL, _PERIODS = 1.0 / 5.0, 1.0 / 3.0, 3.0, 1.0 / 5.0, 1.0 / 10.0
 
 
@@ -141,12 +139,12 @@ def _write_vehicle(out, told, frame, p):
 @inlined
 def _remember(memory, state, goal, speeds):
     """Move a row's memory on by a period; its start and clock are set where an episode begins."""
-    if memory[_LEAST] == np.inf:
+    if memory[LEAST] == np.inf:
         for c in range(3):
             memory[c] = state[c]
     remaining = time_to_go(state[0], state[1], state[2], goal[0], goal[1], goal[2], speeds)
-    memory[_LEAST + 1] = 0.0 if remaining < memory[_LEAST] else memory[_LEAST + 1] + 1.0
-    memory[_LEAST] = remaining if remaining < memory[_LEAST] else memory[_LEAST]
+    memory[LEAST + 1] = 0.0 if remaining < memory[LEAST] else memory[LEAST + 1] + 1.0
+    memory[LEAST] = remaining if remaining < memory[LEAST] else memory[LEAST]
 
 
 @kernel
@@ -173,58 +171,16 @@ def observe_rows(told, obstacles, found, memory, order, values, seen):
         ahead = (goal[0] - s[0], goal[1] - s[1], goal[2] - s[2])
         out[_RAYS + FIXED] = cast_along(place, ahead, spheres, found[n], params)
         out[_RAYS + FIXED + 1] = cast_along(place, (s[6], s[7], s[8]), spheres, found[n], params)
-        out[_CLOCK] = _clip(_PERIODS * own[_LEAST + 1])
+        out[_CLOCK] = _clip(_PERIODS * own[LEAST + 1])
 
 
-def _new_memory(count: int) -> NDArray[np.float64]:
-    """Return the memory of rows whose episode begins: a line of start (3), least and clock each."""
+def new_memory(count: int) -> NDArray[np.float64]:
+    """Return (n, 5) a `Memory` a row, of episodes that begin: start, least and clock."""
     return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
-class EgocentricRows:
-    """Observations and references of an environment's rows, each row looked at once a period.
-
-    `memory` and `seen` (n, OBSERVATION_SIZE) are those of the last look.
-    """
-
-    def __init__(self, vehicle: Vehicle, world: World, count: int) -> None:
-        """Make room for the rows."""
-        self._values = pack_egocentric(vehicle, world)
-        self.memory = _new_memory(count)
-        self.seen = np.zeros((count, OBSERVATION_SIZE), np.float32)
-
-    def begin(self, rows: NDArray[np.int64]) -> None:
-        """Forget: at the next look an episode begins in these rows."""
-        self.memory[rows, _LEAST] = np.inf
-
-    def look(self, perceived: Perceived, rows: NDArray[np.int64]) -> None:
-        """Look at rows (k,) after a period."""
-        observe_rows(*perceived, self.memory, rows, self._values, self.seen)
-
-    def restore(self, kept: "EgocentricRows") -> None:
-        """Go back to what a copy holds, in this memory."""
-        self.memory[:], self.seen[:] = kept.memory, kept.seen
-
-    def references(self, actions: ArrayLike, perceived: Perceived) -> NDArray[np.float64]:
-        """Return the references (n, 4) of relative actions (n, 3), which are clipped to [-1, 1].
-
-        Raises ValueError for another shape, or naming the rows that are not finite.
-        """
-        count = len(self.seen)
-        wanted = np.ascontiguousarray(actions, np.float32)
-        if wanted.shape != (count, 3):
-            raise ValueError(f"actions must have shape ({count}, 3), offsets in [-1, 1], got {wanted.shape}")
-        finite = np.isfinite(wanted)
-        if not finite.all():
-            bad = np.flatnonzero(~finite.all(axis=1)).tolist()
-            raise ValueError(f"actions must be finite offsets in [-1, 1]; rows {bad} are not")
-        out = np.empty((count, 4))
-        place_references(perceived.told, wanted, self.memory, self._values, out)
-        return out
-
-
 class Egocentric:
-    """Sees and acts through the raw interface as `interface="egocentric"` does, bit for bit.
+    """Sees and acts as `interface="egocentric"` does: for environments, and through the raw interface, bit for bit.
 
     Args:
         simulation: of the environment; vehicle and world are read from it.
@@ -233,6 +189,20 @@ class Egocentric:
     def __init__(self, simulation: Simulation) -> None:
         """Pack the constants."""
         self.values = pack_egocentric(simulation.vehicle, simulation.world)
+
+    def look(
+        self, perceived: Perceived, memory: NDArray[np.float64], rows: NDArray[np.int64], seen: NDArray[np.float32]
+    ) -> None:
+        """Look at rows (k,) once a period: writes `seen` (n, OBSERVATION_SIZE), moves `memory` (n, 5) on."""
+        observe_rows(*perceived, memory, rows, self.values, seen)
+
+    def place(
+        self, perceived: Perceived, memory: NDArray[np.float64], actions: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
+        """Return the references (n, 4), every number a float32, of relative actions (n, 3), clipped to [-1, 1]."""
+        out = np.empty((len(actions), 4))
+        place_references(perceived.told, np.ascontiguousarray(actions), memory, self.values, out)
+        return out
 
     def observe(
         self, observation: RawObservation, memory: Memory | None = None, starting: ArrayLike | None = None
@@ -252,17 +222,17 @@ class Egocentric:
         """
         perceived, single = _load(observation)
         count = len(perceived.told)
-        memories, out = _new_memory(count), np.empty((count, OBSERVATION_SIZE), np.float32)
+        memories, out = new_memory(count), np.empty((count, OBSERVATION_SIZE), np.float32)
         if memory is not None:
-            parts = (memories[:, :_LEAST], memories[:, _LEAST], memories[:, _LEAST + 1])
+            parts = (memories[:, :LEAST], memories[:, LEAST], memories[:, LEAST + 1])
             for name, own, given in zip(Memory._fields, parts, memory):
                 own[:] = _shaped(f"memory.{name}", given, own.shape, single)
         if starting is not None:
-            memories[_shaped("starting", starting, (count,), single) != 0.0, _LEAST] = np.inf
-        observe_rows(*perceived, memories, np.arange(count), self.values, out)
+            memories[_shaped("starting", starting, (count,), single) != 0.0, LEAST] = np.inf
+        self.look(perceived, memories, np.arange(count), out)
         if single:
             memories, out = memories[0], out[0]
-        return out, Memory(memories[..., :_LEAST].copy(), *memories[..., _LEAST:].T.copy())
+        return out, Memory(memories[..., :LEAST].copy(), *memories[..., LEAST:].T.copy())
 
     def reference(self, action: ArrayLike, observation: RawObservation, memory: Memory) -> NDArray[np.float32]:
         """Return the raw action, (4,) or (n, 4) float32 in m, m, m, rad, that a relative action stands for.
@@ -281,8 +251,7 @@ class Egocentric:
         if not np.isfinite(wanted).all():
             raise ValueError(f"action must be finite, got {action!r}")
         starts = np.ascontiguousarray(_shaped("memory.start", memory.start, (count, 3), single))
-        out = np.empty((count, 4))
-        place_references(perceived.told, np.ascontiguousarray(wanted, np.float32), starts, self.values, out)
+        out = self.place(perceived, starts, wanted.astype(np.float32))
         return (out[0] if single else out).astype(np.float32)
 
 

@@ -29,7 +29,7 @@ def test_ticks_can_be_asked_for_at_any_time():
             each.step(np.array([0.0, 0.0, 3.0, 0.0]))
         lengths.append(len(env._core.screen.track(0).ticks(env.simulation)))
     assert lengths == [11, 21, 31, 41, 51, 61]
-    often, once = (each._screen.track(0).ticks(each.simulation) for each in (env, other))
+    often, once = (each._core.screen.track(0).ticks(each.simulation) for each in (env, other))
     np.testing.assert_array_equal(often, once)
 
 
