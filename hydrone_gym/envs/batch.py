@@ -16,11 +16,20 @@ from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.requests import REFERENCE, checked
 from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
-from hydrone_gym.envs.task import OUTCOME, Missions, begin_rows, for_part, new_episodes, pack_task, settle
+from hydrone_gym.envs.task import (
+    OUTCOME,
+    REPORT,
+    Missions,
+    begin_rows,
+    copy_report,
+    for_part,
+    new_episodes,
+    pack_task,
+    settle,
+)
 from hydrone_gym.perception.egocentric import LEAST, OBSERVATION_SIZE, Egocentric, new_memory
 from hydrone_gym.perception.perceived import Perceived, copy_rows, perceive
 from hydrone_gym.rendering.view import new_screen
-from hydrone_gym.simulation.block import LANES
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import named_vehicle
@@ -157,12 +166,12 @@ class EpisodeBatch:
 
     def note_crossings(self, part: slice) -> None:
         """Append the crossings of this period; lists handed out before are left alone."""
-        counts = self.episodes.report[-1, part]
-        rows = counts.nonzero()[0]
+        rows = part.start + self.episodes.report[part, -1].nonzero()[0]
         if rows.size:
-            logs = self.episodes.rows["crossing_log"][part][rows].tolist()
-            for row, log, count in zip((part.start + rows).tolist(), logs, counts[rows].tolist(), strict=True):
-                self.transitions[row] = [*self.transitions[row], *crossings_of(log, int(count))]
+            counts, logs = self.episodes.report[rows, -1].astype(int), self.episodes.rows["crossing_log"]
+            some = logs[rows, : counts.max()].tolist()
+            for row, log, count in zip(rows.tolist(), some, counts.tolist(), strict=True):
+                self.transitions[row] = [*self.transitions[row], *crossings_of(log, count)]
 
     def fly(self, references: NDArray[np.float64], *, same_step: bool) -> Flown:
         """Fly one period toward references (n, 4); rows that had ended before begin anew instead.
@@ -170,31 +179,31 @@ class EpisodeBatch:
         With `same_step`, rows that end now begin anew at once.
         """
         self.starting[:] = False
-        before = np.empty_like(self.episodes.report) if same_step else None
-        observations, crossings = np.full((2, self.count), None, dtype=object) if same_step else (None, None)
-        observation = self.new_observation()
+        report, now = (np.empty((len(REPORT), self.count)) for _ in range(2))
+        last_observations, last_transitions = np.full((2, self.count if same_step else 0), None, dtype=object)
+        flown = Flown(report if same_step else now, now, self.new_observation(), last_observations, last_transitions)
+        self._spread(lambda k: self._fly_part(k, references, flown))
+        return flown
 
-        def work(k: int) -> None:
-            part = self._parts[k]
-            self.advance(references, k)
-            self.note_crossings(part)
-            again = self.ended[part].nonzero()[0]
+    def _fly_part(self, k: int, references: NDArray[np.float64], flown: Flown) -> None:
+        part, report, ended = self._parts[k], self.episodes.report, self.ended[self._parts[k]]
+        self.advance(references, k)
+        self.note_crossings(part)
+        again = ended.nonzero()[0]
+        if again.size:
+            self.begin(part.start + again, look=False)
+        self.look(self._orders[k])
+        np.not_equal(report[part, OUTCOME], RUNNING, out=ended)
+        if flown.report is not flown.now:
+            copy_report(report, part.start, part.stop, flown.report)
+            again = part.start + ended.nonzero()[0]
+            for row in again.tolist():
+                flown.last_observations[row] = self.observation_of(row)
+                flown.last_transitions[row] = self.transitions[row]
             if again.size:
-                self.begin(part.start + again, look=False)
-            self.look(self._orders[k])
-            np.not_equal(self.episodes.report[OUTCOME, part], RUNNING, out=self.ended[part])
-            if before is not None:
-                before[:, part] = self.episodes.report[:, part]
-                again = part.start + self.ended[part].nonzero()[0]
-                for row in again.tolist():
-                    observations[row], crossings[row] = self.observation_of(row), self.transitions[row]
-                if again.size:
-                    self.begin(again)
-            self.observe(part, observation)
-
-        self._spread(work)
-        now = self.episodes.report.copy()
-        return Flown(now if before is None else before, now, observation, observations, crossings)
+                self.begin(again)
+        copy_report(report, part.start, part.stop, flown.now)
+        self.observe(part, flown.observation)
 
     def _spread(self, work: Callable[[int], None]) -> None:
         """Do every part's work, the first of them in this thread."""

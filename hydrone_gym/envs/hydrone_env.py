@@ -154,7 +154,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         core.begin(_ONLY, [scenario])
         self._scenario, self._outcome = scenario, RUNNING
         core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
-        return core.observation_of(0), info_of(core.episodes.report[:, 0].tolist(), core.transitions[0])
+        return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0])
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period with the reference moving to the action; returns are those of the class's description.
@@ -178,7 +178,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         core.advance(references)
         core.look(_ONLY)
         screen.update(now.rows, now.seen)
-        report = now.report[:, 0].tolist()
+        report = now.report[0].tolist()
         if report[-1] > 0.0:
             core.note_crossings(slice(0, 1))
         self._outcome = report[OUTCOME]
@@ -217,7 +217,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             raise TypeError(f"snapshot must come from get_state(), got {type(snapshot).__name__}")
         snapshot.check_options(self.options)
         core, self._scenario = self._core, snapshot.scenario
-        self._outcome = float(snapshot.episodes.report[OUTCOME, 0])
+        self._outcome = float(snapshot.episodes.report[0, OUTCOME])
         kept_arrays = (*snapshot.episodes, *snapshot.egocentric)
         for own, kept in zip((*core.episodes, core.memory, core.seen), kept_arrays, strict=True):
             own[...] = kept

@@ -23,27 +23,26 @@ _COUNT = len(TERMS)
 
 
 @inlined
-def write_reward(out, n, before, after, velocity, outcome):
+def write_reward(out, before, after, velocity, outcome):
     """Write the terms of a row in the order of `TERMS`, then their sum from left to right.
 
     Args:
-        out: (K, rows) float64, K > len(TERMS).
-        n: row.
+        out: (K,) float64, K > len(TERMS).
         before, after: time-to-go (s) at the beginning and at the end of the period.
         velocity: (vx, vy, vz) in m/s at its end.
         outcome: an `Outcome`.
     """
     vx, vy, vz = velocity
     slow = np.sqrt(vx * vx + vy * vy + vz * vz) < SLOW_SPEED
-    out[0, n] = SCALE * PROGRESS * (before - after)
-    out[1, n] = SCALE * TIME
-    out[2, n] = SCALE * SLOW if slow else 0.0
-    out[3, n] = SCALE * GOAL_REACHED if outcome == GOAL else 0.0
-    out[4, n] = SCALE * FAILURE if outcome == COLLISION else 0.0
-    out[5, n] = SCALE * FAILURE if outcome == ROUGH_TRANSITION else 0.0
-    out[6, n] = SCALE * FAILURE if outcome == OUT_OF_BOUNDS else 0.0
-    out[7, n] = SCALE * FAILURE if outcome == DIVERGED else 0.0
+    out[0] = SCALE * PROGRESS * (before - after)
+    out[1] = SCALE * TIME
+    out[2] = SCALE * SLOW if slow else 0.0
+    out[3] = SCALE * GOAL_REACHED if outcome == GOAL else 0.0
+    out[4] = SCALE * FAILURE if outcome == COLLISION else 0.0
+    out[5] = SCALE * FAILURE if outcome == ROUGH_TRANSITION else 0.0
+    out[6] = SCALE * FAILURE if outcome == OUT_OF_BOUNDS else 0.0
+    out[7] = SCALE * FAILURE if outcome == DIVERGED else 0.0
     total = 0.0
     for k in range(_COUNT):
-        total += out[k, n]
-    out[_COUNT, n] = total
+        total += out[k]
+    out[_COUNT] = total

@@ -18,7 +18,7 @@ from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.bodies import segment_distance
 from hydrone_gym.world.world import World
 
-# What is reported of each row, one line each.
+# What is reported of each row, one column each.
 REPORT = (*TERMS, "reward", "outcome", "time", "energy", "clearance", "time_to_go", "crossings")
 OUTCOME = REPORT.index("outcome")
 
@@ -32,7 +32,7 @@ class Episodes(NamedTuple):
     seen: NDArray[np.uint8]  # (n, M) 1 for a detected obstacle
     found: NDArray[np.int64]  # (n,) number of detected obstacles
     known: NDArray[np.float64]  # (n, M, 4) detected spheres in order of detection, m
-    report: NDArray[np.float64]  # (len(REPORT), n) of the last period; times in s
+    report: NDArray[np.float64]  # (n, len(REPORT)) of the last period; times in s
 
 
 class Missions(NamedTuple):
@@ -53,7 +53,7 @@ def new_episodes(count: int, obstacles: int, lanes: int) -> Episodes:
         np.zeros((count, obstacles), np.uint8),
         np.zeros(count, np.int64),
         np.zeros((count, obstacles, 4)),
-        np.zeros((len(REPORT), count)),
+        np.zeros((count, len(REPORT))),
     )
 
 
@@ -72,9 +72,7 @@ class TaskParams(NamedTuple):
 def pack_task(vehicle: Vehicle, world: World, time_limit: float, lanes: int) -> NDArray[np.float64]:
     """Flatten the constants of a task with a time limit in s to one array, which reaches a kernel fastest."""
     limit = math.ceil(time_limit / TICK - 1e-9)
-    return np.array(
-        [0.0, 0.0, lanes, vehicle.radius, world.sensor_range, limit, *cruise_speeds(envelope_of(vehicle))]
-    )
+    return np.array([0.0, 0.0, lanes, vehicle.radius, world.sensor_range, limit, *cruise_speeds(envelope_of(vehicle))])
 
 
 def for_part(values: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
@@ -119,11 +117,11 @@ def _surround(now, n, missions, k, params):
     place = (row.state[0], row.state[1], row.state[2])
     row.clearance = np.inf
     for j in range(now.seen.shape[1]):
+        sphere = missions.spheres[k, j]
         for c in range(4):
-            now.obstacles[block, (4 * j + c) * lanes + lane] = missions.spheres[k, j, c]
+            now.obstacles[block, (4 * j + c) * lanes + lane] = sphere[c]
             now.known[n, j, c] = 0.0
-        body = (missions.spheres[k, j, 0], missions.spheres[k, j, 1], missions.spheres[k, j, 2], missions.spheres[k, j, 3])
-        distance = segment_distance(place, place, body)
+        distance = segment_distance(place, place, (sphere[0], sphere[1], sphere[2], sphere[3]))
         now.closest[block, j * lanes + lane] = distance
         row.clearance = min(row.clearance, distance - params.radius)
         now.seen[n, j] = 0
@@ -138,13 +136,13 @@ def _judge(now, n, params):
         row.outcome = TIMEOUT
     s = row.state
     after = _potential_of(row, params.speeds)
-    write_reward(report, n, report[OUTCOME + 4, n], after, (s[6], s[7], s[8]), row.outcome)
-    report[OUTCOME, n] = row.outcome
-    report[OUTCOME + 1, n] = row.ticks * TICK
-    report[OUTCOME + 2, n] = row.energy
-    report[OUTCOME + 3, n] = row.clearance
-    report[OUTCOME + 4, n] = after
-    report[OUTCOME + 5, n] = row.crossings
+    write_reward(report[n], report[n, OUTCOME + 4], after, (s[6], s[7], s[8]), row.outcome)
+    report[n, OUTCOME] = row.outcome
+    report[n, OUTCOME + 1] = row.ticks * TICK
+    report[n, OUTCOME + 2] = row.energy
+    report[n, OUTCOME + 3] = row.clearance
+    report[n, OUTCOME + 4] = after
+    report[n, OUTCOME + 5] = row.crossings
     row.crossings = 0.0
 
 
@@ -178,8 +176,16 @@ def begin_rows(now, missions, order, values):
         n = order[k]
         _place_row(now.rows[n], missions, k)
         _surround(now, n, missions, k, params)
-        now.report[OUTCOME + 4, n] = _potential_of(now.rows[n], params.speeds)
+        now.report[n, OUTCOME + 4] = _potential_of(now.rows[n], params.speeds)
         _judge(now, n, params)
         for term in range(OUTCOME):
-            now.report[term, n] = 0.0
+            now.report[n, term] = 0.0
         detect(now, n, params.lanes, params.sensor_range)
+
+
+@kernel
+def copy_report(report, first, last, columns):
+    """Copy the report of rows [first, last) to columns (len(REPORT), n), one array a quantity."""
+    for c in range(columns.shape[0]):
+        for n in range(first, last):
+            columns[c, n] = report[n, c]

@@ -101,7 +101,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         mask[rows] = True
         observation = self._core.new_observation()
         self._core.observe(slice(0, self.num_envs), observation)
-        return observation, batch_info(self._core.episodes.report, self._core.transitions, mask)
+        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, mask)
 
     def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
@@ -170,4 +170,3 @@ HydroneVectorEnv.__doc__ = with_options(HydroneVectorEnv.__doc__, VectorOptions)
 
 def _many(seed: Any) -> bool:
     return seed is not None and not isinstance(seed, int | np.integer)
-
