@@ -187,11 +187,13 @@ class EpisodeBatch:
 
     def _fly_part(self, k: int, references: NDArray[np.float64], flown: Flown) -> None:
         part, report, ended = self._parts[k], self.episodes.report, self.ended[self._parts[k]]
+        again = part.start + ended.nonzero()[0]
+        # before they fly: while one thread draws, the others advance
+        missions = self.missions_of(again) if again.size else None
         self.advance(references, k)
         self.note_crossings(part)
-        again = ended.nonzero()[0]
-        if again.size:
-            self.begin(part.start + again, look=False)
+        if missions is not None:
+            self.begin(again, missions, look=False)
         self.look(self._orders[k])
         np.not_equal(report[part, OUTCOME], RUNNING, out=ended)
         if flown.report is not flown.now:
@@ -201,7 +203,7 @@ class EpisodeBatch:
                 flown.last_observations[row] = self.observation_of(row)
                 flown.last_transitions[row] = self.transitions[row]
             if again.size:
-                self.begin(again)
+                self.begin(again, self.missions_of(again))
         copy_report(report, part.start, part.stop, flown.now)
         self.observe(part, flown.observation)
 
@@ -214,28 +216,24 @@ class EpisodeBatch:
             for job in jobs:
                 job.result()
 
-    def begin(
-        self, rows: NDArray[np.int64], scenarios: Sequence[Scenario | None] | None = None, *, look: bool = True
-    ) -> None:
-        """Begin new episodes.
-
-        Args:
-            rows: (k,) which.
-            scenarios: (k,) what to fly; None draws one from the row's own random stream.
-            look: whether to look at them, as is to be done once a period.
-        """
+    def missions_of(self, rows: NDArray[np.int64], scenarios: Sequence[Scenario | None] | None = None) -> Missions:
+        """Return what episodes of rows (k,) begin with: scenarios (k,), None being drawn from the row's own stream."""
         count, listed = len(rows), rows.tolist()
         missions = Missions(np.empty((count, 4)), np.empty((count, 3)), np.empty((count, self._obstacles, 4)))
         drawn = np.arange(count)
         if scenarios is not None:
-            drawn = np.array([k for k, scenario in enumerate(scenarios) if scenario is None], np.int64)
+            drawn = np.array([k for k in range(count) if scenarios[k] is None], np.int64)
             for k, scenario in enumerate(scenarios):
                 if scenario is not None:
                     _load(scenario, k, missions)
         if drawn.size:
             self._draw([self.generators[listed[k]] for k in drawn], drawn, missions)
+        return missions
+
+    def begin(self, rows: NDArray[np.int64], missions: Missions, *, look: bool = True) -> None:
+        """Begin the episodes of rows (k,), and look at them unless that is still to come in this period."""
         begin_rows(self.episodes, missions, rows, self._task)
-        for row in listed:
+        for row in rows.tolist():
             self.transitions[row] = []
         self.ended[rows], self.starting[rows] = False, True
         self.memory[rows, LEAST] = np.inf
@@ -250,8 +248,8 @@ class EpisodeBatch:
         solved = place_many(*self._prepared, numbers, drawn, *missions)
         if not solved.all():
             for i in np.flatnonzero(~solved).tolist():
-                own = [array[drawn[i]] for array in missions]
-                draw(self.law, self._prepared, generators[i], *own, numbers[i])
+                start, goal, spheres = (array[drawn[i]] for array in missions)
+                draw(self.law, self._prepared, generators[i], start, goal, spheres, numbers[i])
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""

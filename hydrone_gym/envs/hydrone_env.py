@@ -151,7 +151,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             scenario = generate(core.law, self.world, self.vehicle.radius, self.np_random)
         else:
             check_scenario(scenario, self.world, self.vehicle.radius, core.sphere_space)
-        core.begin(_ONLY, [scenario])
+        core.begin(_ONLY, core.missions_of(_ONLY, [scenario]))
         self._scenario, self._outcome = scenario, RUNNING
         core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
         return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0])
@@ -218,9 +218,9 @@ class HydroneEnv(gym.Env[Any, Any]):
         snapshot.check_options(self.options)
         core, self._scenario = self._core, snapshot.scenario
         self._outcome = float(snapshot.episodes.report[0, OUTCOME])
-        kept_arrays = (*snapshot.episodes, *snapshot.egocentric)
-        for own, kept in zip((*core.episodes, core.memory, core.seen), kept_arrays, strict=True):
-            own[...] = kept
+        own = (*core.episodes, core.memory, core.seen)
+        for array, kept in zip(own, (*snapshot.episodes, *snapshot.egocentric), strict=True):
+            array[...] = kept
         core.transitions[0] = [dict(crossing) for crossing in snapshot.transitions]
         self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
         self._np_random_seed = snapshot.seed

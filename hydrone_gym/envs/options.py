@@ -39,8 +39,8 @@ class Options:
     - `vertical_mode` (True): hold still laterally inside the transition zone.
     - `rough_transition` ("fail"): "fail" ends an episode at a rough crossing, "count" only notes it.
     - `time_limit` (120.0): s.
-    - `interface` ("world"): the spaces of `HydroneEnv`; "egocentric": a flat (68,) observation and (3,) relative actions
-      for learners, documented in `hydrone_gym.perception.egocentric`.
+    - `interface` ("world"): the spaces of `HydroneEnv`; "egocentric": a flat (68,) observation and (3,) relative
+      actions for learners, documented in `hydrone_gym.perception.egocentric`.
     - `render_mode` (None): "rgb_array" for pictures, "human" for a window; `hydrone_gym.rendering` describes them.
     - `render_size` ((640, 480)): width and height of pictures in pixels; `camera` ("overview"): or "chase".
 

@@ -114,7 +114,7 @@ def checked(actions: ArrayLike, shape: tuple[int, int], words: str, dtype: type)
 
     Raises ValueError for another shape, or naming the rows that are not finite.
     """
-    array = np.asarray(actions, dtype)
+    array: NDArray = np.asarray(actions, dtype)
     if array.shape != shape:
         raise ValueError(f"actions must have shape {shape} {words}, got {array.shape}")
     finite = np.isfinite(array)

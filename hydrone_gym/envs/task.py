@@ -151,8 +151,8 @@ def settle(rows, obstacles, closest, seen, found, known, report, values):
     """Settle a part of the rows after a period: reward, sensing, report.
 
     Args:
-        rows, obstacles, closest, seen, found, known, report: `Episodes`, updated; one by one they reach a kernel in half
-            the time that the tuple takes. The crossings reported are those of this period.
+        rows, obstacles, closest, seen, found, known, report: `Episodes`, updated; one by one they reach a kernel in
+            half the time that the tuple takes. The crossings reported are those of this period.
         values: from `for_part`.
     """
     now, params = Episodes(rows, obstacles, closest, seen, found, known, report), _unpack_task(values)

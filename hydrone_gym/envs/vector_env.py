@@ -94,7 +94,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             if scenario is not None:
                 check_scenario(scenario, simulation.world, simulation.vehicle.radius, self._core.sphere_space)
         self._seed(seed, rows)
-        self._core.begin(rows, scenarios)
+        self._core.begin(rows, self._core.missions_of(rows, scenarios))
         if self.render_mode is not None:
             self._core.show(rows)
         mask = np.zeros(self.num_envs, bool)

@@ -29,8 +29,8 @@ is expressed in it: what is learned on one mission then holds on any other, howe
 | 63-66 | rays up, down, to the goal, along the velocity (1 at rest) | as above |
 | 67 | progress clock | 1/10 period |
 
-Rays are those of `hydrone_gym.perception.rays`. The progress clock counts the periods since the time-to-go in an empty world
-last fell below its least value so far: it tells a detour that goes on from one that has begun, which no single
+Rays are those of `hydrone_gym.perception.rays`. The progress clock counts the periods since the time-to-go in an empty
+world last fell below its least value so far: it tells a detour that goes on from one that has begun, which no single
 observation does.
 
 **Action** (3,) in [-1, 1]: the reference's offset from the vehicle, 2, 2 and 1.5 m along x', y', z; the reference is
