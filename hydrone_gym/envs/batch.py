@@ -21,14 +21,12 @@ from hydrone_gym.envs.task import (
     REPORT,
     Missions,
     begin_rows,
-    copy_report,
-    for_part,
     new_episodes,
     pack_task,
     settle,
 )
 from hydrone_gym.perception.egocentric import LEAST, OBSERVATION_SIZE, Egocentric, new_memory
-from hydrone_gym.perception.perceived import Perceived, copy_rows, perceive
+from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
@@ -78,7 +76,6 @@ class EpisodeBatch:
         self.reference_filter: ReferenceFilter | None = None
         self.law, self._obstacles = options.law, options.num_obstacles
         self._prepared = prepare(self.law, world, vehicle.radius)
-        self._task = pack_task(vehicle, world, options.time_limit, lanes)
         threads = max(1, min(threads, count // _ROWS_A_THREAD))
         self.simulations = [Simulation(vehicle, world, options.period, lanes) for _ in range(threads)]
         self.screen = new_screen(
@@ -103,10 +100,11 @@ class EpisodeBatch:
         edges = [lanes * round(blocks * k / threads) for k in range(threads)] + [self.count]
         self._parts = [slice(a, b) for a, b in pairwise(edges)]
         self._orders = [np.arange(part.start, part.stop) for part in self._parts]
-        self._flown = []
+        simulation, limit, self._flown = self.simulations[0], self.options.time_limit, []
         for part in self._parts:
             own = slice(part.start // lanes, -(-part.stop // lanes))
-            self._flown.append((part, for_part(self._task, part), now.rows[part], now.obstacles[own], now.closest[own]))
+            task = pack_task(simulation.vehicle, simulation.world, limit, lanes, part)
+            self._flown.append((part, task, now.rows[part], now.obstacles[own], now.closest[own]))
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -135,7 +133,8 @@ class EpisodeBatch:
         if self.egocentric is not None:
             out[part] = self.seen[part]
         else:
-            copy_rows(self.perceived.told, self.perceived.obstacles, part.start, part.stop, tuple(out.values()))
+            for key, array in self._raw.items():
+                out[key][part] = array[part]
 
     def references(self, actions: ArrayLike) -> NDArray[np.float64]:
         """Return the references (n, 4) that actions stand for, as they are flown.
@@ -197,14 +196,14 @@ class EpisodeBatch:
         self.look(self._orders[k])
         np.not_equal(report[part, OUTCOME], RUNNING, out=ended)
         if flown.report is not flown.now:
-            copy_report(report, part.start, part.stop, flown.report)
+            flown.report[:, part] = report[part].T
             again = part.start + ended.nonzero()[0]
             for row in again.tolist():
                 flown.last_observations[row] = self.observation_of(row)
                 flown.last_transitions[row] = self.transitions[row]
             if again.size:
                 self.begin(again, self.missions_of(again))
-        copy_report(report, part.start, part.stop, flown.now)
+        flown.now[:, part] = report[part].T
         self.observe(part, flown.observation)
 
     def _spread(self, work: Callable[[int], None]) -> None:
@@ -232,7 +231,7 @@ class EpisodeBatch:
 
     def begin(self, rows: NDArray[np.int64], missions: Missions, *, look: bool = True) -> None:
         """Begin the episodes of rows (k,), and look at them unless that is still to come in this period."""
-        begin_rows(self.episodes, missions, rows, self._task)
+        begin_rows(self.episodes, missions, rows, self._flown[0][1])
         for row in rows.tolist():
             self.transitions[row] = []
         self.ended[rows], self.starting[rows] = False, True

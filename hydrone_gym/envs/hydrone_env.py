@@ -218,7 +218,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         snapshot.check_options(self.options)
         core, self._scenario = self._core, snapshot.scenario
         self._outcome = float(snapshot.episodes.report[0, OUTCOME])
-        own = (*core.episodes, core.memory, core.seen)
+        own: list[np.ndarray] = [*core.episodes, core.memory, core.seen]
         for array, kept in zip(own, (*snapshot.episodes, *snapshot.egocentric), strict=True):
             array[...] = kept
         core.transitions[0] = [dict(crossing) for crossing in snapshot.transitions]

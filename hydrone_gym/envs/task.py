@@ -57,34 +57,23 @@ def new_episodes(count: int, obstacles: int, lanes: int) -> Episodes:
     )
 
 
-class TaskParams(NamedTuple):
-    """The constants of a task; far fewer than a `Model`, which would add a second to the first compilation."""
-
-    first: int  # rows [first, last) are settled
-    last: int
-    lanes: int  # rows a block
-    radius: float  # m
-    sensor_range: float  # m
-    limit: float  # ticks after which a running episode times out
-    speeds: CruiseSpeeds
-
-
-def pack_task(vehicle: Vehicle, world: World, time_limit: float, lanes: int) -> NDArray[np.float64]:
-    """Flatten the constants of a task with a time limit in s to one array, which reaches a kernel fastest."""
-    limit = math.ceil(time_limit / TICK - 1e-9)
-    return np.array([0.0, 0.0, lanes, vehicle.radius, world.sensor_range, limit, *cruise_speeds(envelope_of(vehicle))])
+TASK = np.dtype(
+    [
+        ("first", np.int64),  # rows [first, last) are settled
+        ("last", np.int64),
+        ("lanes", np.int64),  # rows a block
+        ("radius", np.float64),  # m
+        ("sensor_range", np.float64),  # m
+        ("limit", np.float64),  # ticks after which a running episode times out
+        ("speeds", [(name, np.float64) for name in CruiseSpeeds._fields]),
+    ]
+)
 
 
-def for_part(values: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
-    """Return packed constants with which `settle` settles a part of the rows."""
-    return np.append([part.start, part.stop], values[2:])
-
-
-@inlined
-def _unpack_task(v):
-    """Rebuild the `TaskParams` of a packed array inside a kernel."""
-    speeds = CruiseSpeeds(v[6], v[7], v[8], v[9], v[10])
-    return TaskParams(int(v[0]), int(v[1]), int(v[2]), v[3], v[4], v[5], speeds)
+def pack_task(vehicle: Vehicle, world: World, time_limit: float, lanes: int, part: slice) -> np.ndarray:
+    """Return the constants of a task with a time limit in s, for a part of the rows: one record (1,), dtype `TASK`."""
+    limit, speeds = math.ceil(time_limit / TICK - 1e-9), tuple(cruise_speeds(envelope_of(vehicle)))
+    return np.array([(part.start, part.stop, lanes, vehicle.radius, world.sensor_range, limit, speeds)], TASK)
 
 
 @inlined
@@ -153,9 +142,9 @@ def settle(rows, obstacles, closest, seen, found, known, report, values):
     Args:
         rows, obstacles, closest, seen, found, known, report: `Episodes`, updated; one by one they reach a kernel in
             half the time that the tuple takes. The crossings reported are those of this period.
-        values: from `for_part`.
+        values: from `pack_task`.
     """
-    now, params = Episodes(rows, obstacles, closest, seen, found, known, report), _unpack_task(values)
+    now, params = Episodes(rows, obstacles, closest, seen, found, known, report), values[0]
     for n in range(params.first, params.last):
         _judge(now, n, params)
         detect(now, n, params.lanes, params.sensor_range)
@@ -171,7 +160,7 @@ def begin_rows(now, missions, order, values):
         order: (k,) int64, which rows.
         values: from `pack_task`.
     """
-    params = _unpack_task(values)
+    params = values[0]
     for k in range(order.size):
         n = order[k]
         _place_row(now.rows[n], missions, k)
@@ -181,11 +170,3 @@ def begin_rows(now, missions, order, values):
         for term in range(OUTCOME):
             now.report[n, term] = 0.0
         detect(now, n, params.lanes, params.sensor_range)
-
-
-@kernel
-def copy_report(report, first, last, columns):
-    """Copy the report of rows [first, last) to columns (len(REPORT), n), one array a quantity."""
-    for c in range(columns.shape[0]):
-        for n in range(first, last):
-            columns[c, n] = report[n, c]

@@ -48,7 +48,7 @@ from numpy.typing import ArrayLike, NDArray
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.perception.rays import FIXED, RAY_NAMES, cast_along, cast_fixed, leave_box
-from hydrone_gym.perception.relative import mission_frame, pack_egocentric, place_references, unpack_egocentric
+from hydrone_gym.perception.relative import mission_frame, pack_egocentric, place_references
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
@@ -158,7 +158,7 @@ def observe_rows(told, obstacles, found, memory, order, values, seen):
         values: from `pack_egocentric`.
         seen: (n, OBSERVATION_SIZE) float32, those rows written.
     """
-    params = unpack_egocentric(values)
+    params = values[0]
     for k in range(order.size):
         n = order[k]
         row, own, spheres, out = told[n], memory[n], obstacles[n], seen[n]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym._jit import inlined, kernel
+from hydrone_gym._jit import inlined
 
 TOLD = ("state", "integral", "reference", "goal")
 
@@ -49,23 +49,6 @@ class Perceived(NamedTuple):
     def observation(self) -> dict[str, NDArray[np.float64]]:
         """Return the raw observation of all rows; it shares this memory."""
         return {**{key: self.told[key] for key in TOLD}, "obstacles": self.obstacles}
-
-
-@kernel
-def copy_rows(told, obstacles, first, last, raw):
-    """Copy rows [first, last) of a `Perceived` to the arrays of a raw observation, in the order of its keys."""
-    for n in range(first, last):
-        row = told[n]
-        for c in range(12):
-            raw[0][n, c] = row.state[c]
-        for c in range(4):
-            raw[1][n, c] = row.integral[c]
-            raw[2][n, c] = row.reference[c]
-        for c in range(3):
-            raw[3][n, c] = row.goal[c]
-        for j in range(obstacles.shape[1]):
-            for c in range(4):
-                raw[4][n, j, c] = obstacles[n, j, c]
 
 
 def perceive(rows: np.ndarray, known: NDArray[np.float64], found: NDArray[np.int64]) -> Perceived:

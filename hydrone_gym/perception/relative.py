@@ -3,10 +3,7 @@
 Why as it is, and the frame: `hydrone_gym.perception.egocentric`.
 """
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.control.envelope import envelope_of
@@ -19,31 +16,15 @@ STEP = (2.0, 2.0, 1.5)  # m along x', y', z at full action: 3.2 m at most, about
 MARGIN = 0.2  # m: the nearest a reference comes to the box
 
 
-class EgocentricParams(NamedTuple):
-    """The constants of the interface: m, m/s."""
-
-    x_min: float
-    y_min: float
-    z_min: float
-    x_max: float
-    y_max: float
-    z_max: float
-    zone: float
-    radius: float
-    speeds: CruiseSpeeds
+_SPEEDS = np.dtype([(name, np.float64) for name in CruiseSpeeds._fields])
+_BOX = ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max", "zone", "radius")  # m
+EGOCENTRIC = np.dtype([*((name, np.float64) for name in _BOX), ("speeds", _SPEEDS)])
 
 
-def pack_egocentric(vehicle: Vehicle, world: World) -> NDArray[np.float64]:
-    """Flatten the constants to one array, which reaches a kernel fastest."""
-    speeds = cruise_speeds(envelope_of(vehicle))
-    return np.array([*world.lower, *world.upper, world.zone, vehicle.radius, *speeds])
-
-
-@inlined
-def unpack_egocentric(v):
-    """Rebuild the `EgocentricParams` of a packed array inside a kernel."""
-    speeds = CruiseSpeeds(v[8], v[9], v[10], v[11], v[12])
-    return EgocentricParams(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], speeds)
+def pack_egocentric(vehicle: Vehicle, world: World) -> np.ndarray:
+    """Return the constants of the interface as one record (1,), dtype `EGOCENTRIC`."""
+    speeds = tuple(cruise_speeds(envelope_of(vehicle)))
+    return np.array([(*world.lower, *world.upper, world.zone, vehicle.radius, speeds)], EGOCENTRIC)
 
 
 @inlined
@@ -79,7 +60,7 @@ def place_references(told, actions, memory, values, out):
         values: from `pack_egocentric`.
         out: (n, 4) float64 m, m, m, rad, written; every number is a float32.
     """
-    p = unpack_egocentric(values)
+    p = values[0]
     for n in range(out.shape[0]):
         row = told[n]
         s, goal = row.state, row.goal

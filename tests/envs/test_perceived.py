@@ -3,7 +3,7 @@
 import numpy as np
 
 from hydrone_gym.perception import perceive
-from hydrone_gym.perception.perceived import TOLD, copy_rows
+from hydrone_gym.perception.perceived import TOLD
 from tests.envs.missions import make
 from tests.envs.raw_observations import WORLD
 from tests.simulation.batches import random_rows
@@ -36,8 +36,3 @@ def test_one_row_and_many_are_told_in_one_memory_layout():
     for count in (1, 2, 17):
         told = perceive(random_rows(np.random.default_rng(0), count, WORLD), np.zeros((count, 0, 4)), None).told
         assert told.flags.c_contiguous
-        out = tuple(np.full((count, *shape), 9.0) for shape in ((12,), (4,), (4,), (3,), (0, 4)))
-        copy_rows(told, np.zeros((count, 0, 4)), 0, count, out)
-        for key, array in zip(TOLD, out):
-            np.testing.assert_array_equal(array, told[key])
-    assert len(copy_rows.signatures) == 1
