@@ -95,6 +95,7 @@ class EpisodeBatch:
         now, lanes, threads = self.episodes, self.lanes, len(self.simulations)
         self.perceived = perceive(now.rows, now.known, now.found)
         self._raw = self.perceived.observation()
+        self._logs = now.rows["crossing_log"]
         self._first = {key: array[0] for key, array in self._raw.items()}
         blocks = -(-self.count // lanes)
         edges = [lanes * round(blocks * k / threads) for k in range(threads)] + [self.count]
@@ -108,7 +109,7 @@ class EpisodeBatch:
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
-        shared = ("perceived", "_raw", "_first", "_flown", "_pool")
+        shared = ("perceived", "_raw", "_logs", "_first", "_flown", "_pool")
         return {name: value for name, value in self.__dict__.items() if name not in shared}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -126,12 +127,14 @@ class EpisodeBatch:
         """Return room for an observation of all rows."""
         if self.egocentric is not None:
             return np.empty(self.seen.shape, np.float32)
-        return {key: np.empty(array.shape) for key, array in self._raw.items()}
+        return {} if self._pool is None else {key: np.empty(array.shape) for key, array in self._raw.items()}
 
     def observe(self, part: slice, out: Any) -> None:
         """Copy what a part of the rows shows now into an observation of all."""
         if self.egocentric is not None:
             out[part] = self.seen[part]
+        elif self._pool is None:
+            out.update((key, array.copy()) for key, array in self._raw.items())
         else:
             for key, array in self._raw.items():
                 out[key][part] = array[part]
@@ -165,12 +168,10 @@ class EpisodeBatch:
 
     def note_crossings(self, part: slice) -> None:
         """Append the crossings of this period; lists handed out before are left alone."""
-        rows = part.start + self.episodes.report[part, -1].nonzero()[0]
-        if rows.size:
-            counts, logs = self.episodes.report[rows, -1].astype(int), self.episodes.rows["crossing_log"]
-            some = logs[rows, : counts.max()].tolist()
-            for row, log, count in zip(rows.tolist(), some, counts.tolist(), strict=True):
-                self.transitions[row] = [*self.transitions[row], *crossings_of(log, count)]
+        counts = self.episodes.report[part, -1]
+        for k in counts.nonzero()[0].tolist():
+            row = part.start + k
+            self.transitions[row] = [*self.transitions[row], *crossings_of(self._logs[row], int(counts[k]))]
 
     def fly(self, references: NDArray[np.float64], *, same_step: bool) -> Flown:
         """Fly one period toward references (n, 4); rows that had ended before begin anew instead.
@@ -235,9 +236,10 @@ class EpisodeBatch:
         for row in rows.tolist():
             self.transitions[row] = []
         self.ended[rows], self.starting[rows] = False, True
-        self.memory[rows, LEAST] = np.inf
-        if look:
-            self.look(rows)
+        if self.egocentric is not None:
+            self.memory[rows, LEAST] = np.inf
+            if look:
+                self.look(rows)
 
     def _draw(self, generators: list[np.random.Generator], drawn: NDArray[np.int64], missions: Missions) -> None:
         """Draw missions, each from its own stream: one kernel call places all, the rare rest goes one by one."""

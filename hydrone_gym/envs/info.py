@@ -38,10 +38,10 @@ def conclude(info: dict[str, Any]) -> tuple[bool, bool]:
     return outcome is not Outcome.TIMEOUT, outcome is Outcome.TIMEOUT
 
 
-def crossings_of(log: Sequence[Sequence[float]], count: int) -> list[dict[str, Any]]:
+def crossings_of(log: NDArray[np.float64], count: int) -> list[dict[str, Any]]:
     """Return the crossings of one period from its row's log; beyond `LOGGED_CROSSINGS` their details are not kept."""
     crossings = []
-    for entry in log[: min(count, LOGGED_CROSSINGS)]:
+    for entry in log[: min(count, LOGGED_CROSSINGS)].tolist():
         crossing: dict[str, Any] = dict(zip(CROSSING_FIELDS, entry, strict=True))
         crossing["direction"] = "exit" if crossing["direction"] > 0.0 else "entry"
         crossings.append(crossing)
