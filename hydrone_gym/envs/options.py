@@ -110,13 +110,13 @@ class Options:
 
 @dataclass(frozen=True)
 class VectorOptions(Options):
-    """What `HydroneVectorEnv` is made with: all `Options`, and
+    """What `HydroneVectorEnv` is made with, besides all `Options`.
 
     - `num_envs` (1): number of rows, at most a million.
     - `autoreset_mode` ("NextStep"): or "SameStep", "Disabled", or a `gymnasium.vector.AutoresetMode`.
     - `threads` (1): threads to spread whole blocks of rows over; used from 512 rows on.
     - `max_episode_steps` (None): replaces `time_limit` if given, in periods.
-    """  # noqa: D415
+    """
 
     num_envs: int = 1
     autoreset_mode: str | AutoresetMode = field(default=AutoresetMode.NEXT_STEP, kw_only=True)
@@ -175,8 +175,9 @@ def takes(kind: Callable[P, O]) -> Callable[[Callable[[Any, O], None]], Callable
 
 
 def with_options(text: str | None, kind: type[Options]) -> str:
-    """Return a class's documentation with that of its options in the place of their name."""
-    return (text or "").replace(f"`{kind.__name__}` lists them.", inspect.getdoc(kind) or "")
+    """Return a class's documentation with the list of its options in the place of their name."""
+    listed = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[2]
+    return inspect.cleandoc(text or "").replace(f"`{kind.__name__}` lists them.", listed)
 
 
 def _one_of(name: str, value: Any, known: tuple[str, ...]) -> None:

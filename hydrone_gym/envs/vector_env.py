@@ -36,8 +36,11 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     an integer array. At the end of an episode `info["is_success"]` is set, and in SAME_STEP mode `final_obs` and
     `final_info`.
 
-    Its options, all by keyword but `num_envs`: `VectorOptions` lists them. `render_mode` is None or "rgb_array":
-    `render()` returns a tuple of pictures, one a row.
+    Options besides those of `HydroneEnv`, all by keyword but `num_envs`:
+
+    `VectorOptions` lists them.
+
+    `render_mode` is None or "rgb_array": `render()` returns a tuple of pictures, one a row.
 
     Reset options: `scenario`, one `Scenario` (or path) for all rows or a sequence of one a row, None entries being
     drawn; `reset_mask` (n,) bool, which rows to reset.
