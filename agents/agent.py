@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent_file import TEXT, AgentFile, read_agent
-from hydrone_gym.envs.egocentric import OBSERVATION_SIZE, Egocentric, Memory, RawObservation
+from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, Memory, RawObservation
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.world.world import World

@@ -15,7 +15,7 @@ import numpy as np
 from gymnasium.envs.registration import registry
 
 from agents.network import Network
-from hydrone_gym.envs.egocentric import NAMES
+from hydrone_gym.perception.egocentric import NAMES
 
 FORMAT = "hydrone_gym agent"
 VERSION = 1

@@ -24,9 +24,9 @@ from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Demonstration, Demonstrations
 from agents.evaluation import MISSIONS
 from agents.network import Network
-from hydrone_gym.envs.egocentric import OBSERVATION_SIZE, Egocentric
-from hydrone_gym.envs.relative import STEP
 from hydrone_gym.evaluation import provenance
+from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric
+from hydrone_gym.perception.relative import STEP
 from hydrone_gym.simulation.outcome import Outcome
 
 REPORT = "cloning.json"

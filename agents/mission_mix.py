@@ -39,9 +39,8 @@ class MissionMix(VecEnv):
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in every row; seeds given by `seed` are used once."""
-        for part, rows in zip(self.parts, self._slices()):
-            part._seeds, part._options = self._seeds[rows], self._options[rows]
-        observations: list[Any] = [part.reset() for part in self.parts]
+        pairs = zip(self.parts, self._slices())
+        observations: list[Any] = [part.begin(self._seeds[rows], self._options[rows]) for part, rows in pairs]
         self.reset_infos = [info for part in self.parts for info in part.reset_infos]
         self._reset_seeds()
         self._reset_options()

@@ -3,43 +3,36 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from agents.vec_env import HydroneVecEnv
-from hydrone_gym.envs.egocentric_rows import EgocentricRows
 from hydrone_gym.envs.reward import SCALE, TIME
-from hydrone_gym.envs.task import Episodes
+from hydrone_gym.envs.vector_env import HydroneVectorEnv
+from hydrone_gym.perception.perceived import Perceived
 from planners.shield import Shield
 
 INTERVENTION = SCALE * TIME  # reward of a period in which the shield flew another reference: as if it were lost
 
 
-class ShieldedRows(EgocentricRows):
-    """Egocentric rows that fly what the shield lets pass.
+class ShieldFilter:
+    """Lets references through that the shield lets pass, for rows of one environment.
 
     `choice` (n,) tells what it did in the last period, as in `planners.shield.ShieldState`.
     """
 
-    def __init__(self, rows: HydroneVecEnv) -> None:
-        """Shield the rows of a vector environment."""
-        super().__init__(rows.env.options, rows.num_envs)
-        self._shield = Shield(None, rows.env.simulation)
-        self._held = np.zeros((rows.num_envs, 4))
-        self.choice = np.zeros(rows.num_envs, np.int64)
+    def __init__(self, env: HydroneVectorEnv) -> None:
+        """Shield the rows of an environment."""
+        self._shield = Shield.for_env(None, env)
+        self._held = np.zeros((env.num_envs, 4))
+        self.choice = np.zeros(env.num_envs, np.int64)
 
-    def begin(self, episodes: Episodes, rows: NDArray[np.intp]) -> None:
-        """Look at rows whose episode begins; they rest, so where they are is the verified hover."""
-        super().begin(episodes, rows)
-        self._held[rows] = episodes.rows["reference"][rows]
-
-    def references(self, actions: ArrayLike, episodes: Episodes) -> NDArray[np.float64]:
-        """Return the references (n, 4) that are flown instead of relative actions (n, 3)."""
-        proposed = super().references(actions, episodes)
-        now = episodes.rows
-        observation = {key: now[key] for key in ("state", "integral", "reference", "goal")}
-        observation["obstacles"] = episodes.known
-        sent, self._held, self.choice = self._shield.check(observation, proposed, self._held)
+    def __call__(
+        self, perceived: Perceived, references: NDArray[np.float64], starting: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """Return the references (n, 4) to fly; rows that begin rest, so where they are is the verified hover."""
+        held = np.where(starting[:, None], perceived.reference, self._held)
+        sent, self._held, self.choice = self._shield.check(perceived.observation(), references, held)
         return sent
 
 
@@ -55,8 +48,8 @@ class ShieldedVecEnv(HydroneVecEnv):
     def __init__(self, env_id: str, num_envs: int = 256, **options: Any) -> None:
         """Make the environment and put the shield between actions and vehicle."""
         super().__init__(env_id, num_envs, **options)
-        self.shielded = ShieldedRows(self)
-        self.env.egocentric = self.shielded
+        self.shielded = ShieldFilter(self.env)
+        self.env.filter_references(self.shielded)
 
     def step_wait(self) -> VecEnvStepReturn:
         """Fly one period in every row."""

@@ -49,14 +49,19 @@ class HydroneVecEnv(VecEnv):
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in every row; seeds given by `seed` are used once."""
-        seeds: Any = None if all(seed is None for seed in self._seeds) else self._seeds
-        options = next((option for option in self._options if option), None)
-        observation, _ = self.env.reset(seed=seeds, options=options)
+        observation = self.begin(self._seeds, self._options)
+        self._reset_seeds()
+        self._reset_options()
+        return observation
+
+    def begin(self, seeds: Sequence[int | None], options: Sequence[dict[str, Any]]) -> VecEnvObs:
+        """Begin an episode in every row, with a seed (None: its stream goes on) and reset options each."""
+        given = None if all(seed is None for seed in seeds) else seeds
+        chosen = next((option for option in options if option), None)
+        observation, _ = self.env.reset(seed=given, options=chosen)
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self._returns[:] = 0.0
         self._lengths[:] = 0
-        self._reset_seeds()
-        self._reset_options()
         return observation
 
     def step_async(self, actions: np.ndarray) -> None:

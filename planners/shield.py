@@ -164,7 +164,7 @@ class Shield:
         for key in ("state", "integral", "reference", "goal"):
             rows[key] = np.reshape(observation[key], rows[key].shape)
         spheres = np.array(observation["obstacles"], np.float64).reshape(count, -1, 4)
-        spheres[spheres[:, :, 3] <= 0.0] = (NOWHERE, 0.0, 0.0, 0.0)
+        spheres[spheres[:, :, 3] <= 0.0] = NOWHERE
         query = GuardQuery(
             rows=rows,
             proposed=np.minimum(np.maximum(proposed, self._low), self._high),

@@ -7,9 +7,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.envs.egocentric import RawObservation
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.perception.egocentric import RawObservation
 from hydrone_gym.simulation.outcome import Outcome
 from planners.shield import HELD, Shield
 

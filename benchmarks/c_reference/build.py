@@ -14,8 +14,8 @@ from hydrone_gym.control.reference import Integral
 from hydrone_gym.control.water import WaterGainParams
 from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.parameters import MediumParams, VehicleParams
-from hydrone_gym.simulation.block import LOGGED_CROSSINGS, ROW, new_block
 from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.storage import LOGGED_CROSSINGS, ROW, new_block
 from hydrone_gym.world.world import WorldParams
 
 HERE = Path(__file__).resolve().parent

@@ -1,118 +1,276 @@
-"""Many episodes at once: storage, threads and resets behind the vector environment."""
+"""The core of both environments: episodes, resets, observations and threads for any number of rows.
+
+The single environment is row 0 of a batch of one; the vector environment adds Gymnasium's rules for resets.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
-from hydrone_gym.envs.task import REPORT, begin_rows, new_episodes, pack_task, settle
+from hydrone_gym.envs.requests import REFERENCE, checked
+from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
+from hydrone_gym.envs.task import (
+    OUTCOME,
+    REPORT,
+    Missions,
+    begin_rows,
+    new_episodes,
+    pack_task,
+    settle,
+)
+from hydrone_gym.perception.egocentric import LEAST, OBSERVATION_SIZE, Egocentric, new_memory
+from hydrone_gym.perception.perceived import Perceived, perceive
+from hydrone_gym.rendering.view import new_screen
+from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.simulation.storage import LANES
+from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.bodies import NOWHERE
 from hydrone_gym.world.generator import draw, first_numbers, prepare
 from hydrone_gym.world.placement import place_many
 from hydrone_gym.world.scenario import Scenario
 
 _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
-_NOWHERE = 1e160  # m: its square overflows, so a sphere there is at distance inf
+
+ReferenceFilter = Callable[[Perceived, NDArray[np.float64], NDArray[np.bool_]], NDArray[np.float64]]
+
+
+class Flown(NamedTuple):
+    """What a step leaves behind of all rows, in new arrays."""
+
+    report: NDArray[np.float64]  # (len(REPORT), n) of the period flown
+    now: NDArray[np.float64]  # the same, but of the next episode where that has begun at once
+    observation: Any  # as of now: a dict of arrays, or one array with interface="egocentric"
+    last_observations: np.ndarray  # (n,) object: an observation where an episode ended and the next has begun at once
+    last_transitions: np.ndarray  # (n,) object: its crossings
 
 
 class EpisodeBatch:
-    """The episodes of a vector environment, advanced sixteen lanes at a time.
+    """The episodes of an environment.
 
     Args:
         options: what every row flies.
         count: number of rows.
+        lanes: how many rows are advanced in one go: 1 for a single row, 16 for batches.
         threads: blocks of lanes are spread over this many threads when there are enough rows.
+        render_modes: those it can be drawn in.
     """
 
-    def __init__(self, options: Options, count: int, threads: int = 1) -> None:
-        """Make the storage; rows hold no episode before `begin`."""
-        self.options = options
-        self.count = count
-        self.episodes = new_episodes(count, options.num_obstacles, LANES)
-        self.report = np.zeros((count, len(REPORT)))
-        self.scenarios: list[Scenario | None] = [None] * count
-        world, vehicle = options.world, options.vehicle
-        self._law = options.law
-        self._prepared = prepare(self._law, world, vehicle.radius)
-        self._task = pack_task(vehicle, world, options.time_limit)
-        self._order = np.arange(count)
-        threads = max(1, min(threads, count // _ROWS_A_THREAD))
-        self.simulations = [Simulation(vehicle, world, options.period, LANES) for _ in range(threads)]
-        blocks = -(-count // LANES)
-        edges = [LANES * round(blocks * k / threads) for k in range(threads)] + [count]
-        self._parts = [slice(a, b) for a, b in pairwise(edges)]
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
-
-    def advance(self, references: NDArray[np.float64]) -> None:
-        """Fly one period toward references (n, 4), then judge every row into `report`."""
-        if self._pool is None:
-            self._advance_part(0, references)
-            return
-        jobs = [self._pool.submit(self._advance_part, k, references) for k in range(len(self._parts))]
-        for job in jobs:
-            job.result()
-
-    def _advance_part(self, k: int, references: NDArray[np.float64]) -> None:
-        part, now, count = self._parts[k], self.episodes, self.options.num_obstacles
-        blocks = slice(part.start // LANES, -(-part.stop // LANES))
-        self.simulations[k].advance(now.rows[part], references[part], now.obstacles[blocks], now.closest[blocks], count)
-        settle(*now, count, LANES, self._task, self._order[part], self.report)
-
-    def begin(
-        self,
-        rows: NDArray[np.intp],
-        generators: Sequence[np.random.Generator],
-        scenarios: Sequence[Scenario | None],
+    def __init__(
+        self, options: Options, count: int, lanes: int, threads: int = 1, render_modes: tuple[str, ...] = ("rgb_array",)
     ) -> None:
-        """Begin new episodes.
+        """Make the storage; rows hold no episode before `begin`."""
+        self.options, self.count, self.lanes = options, count, lanes
+        vehicle, world = named_vehicle(options.vehicle), options.world
+        self.episodes = new_episodes(count, options.num_obstacles, lanes)
+        self.transitions = np.full(count, None, dtype=object)
+        self.ended = np.ones(count, bool)
+        self.starting = np.zeros(count, bool)
+        self.generators: list[np.random.Generator] = []
+        self.reference_filter: ReferenceFilter | None = None
+        self.law, self._obstacles = options.law, options.num_obstacles
+        self._prepared = prepare(self.law, world, vehicle.radius)
+        threads = max(1, min(threads, count // _ROWS_A_THREAD))
+        self.simulations = [Simulation(vehicle, world, options.period, lanes) for _ in range(threads)]
+        self.screen = new_screen(
+            options.render_mode, options.render_size, options.camera, self.simulations[0], render_modes
+        )
+        self.egocentric = Egocentric(self.simulations[0]) if options.interface == "egocentric" else None
+        self.memory, self.seen = new_memory(count), np.zeros((count, OBSERVATION_SIZE), np.float32)  # if egocentric
+        references, raw = action_space(world), observation_space(vehicle, world, options.num_obstacles)
+        self.sphere_space: Any = raw["obstacles"]
+        self.action_space = references if self.egocentric is None else relative_action_space()
+        self.observation_space = raw if self.egocentric is None else egocentric_space()
+        self.low, self.high = references.low.astype(np.float64), references.high.astype(np.float64)
+        self._bind()
 
-        Args:
-            rows: (k,) which.
-            generators: one for each row of the batch.
-            scenarios: (k,) what to fly; None draws one from the row's generator.
+    def _bind(self) -> None:
+        """Make what shares memory with the episodes, and the threads."""
+        now, lanes, threads = self.episodes, self.lanes, len(self.simulations)
+        self.perceived = perceive(now.rows, now.known, now.found)
+        self._raw = self.perceived.observation()
+        self._logs = now.rows["crossing_log"]
+        self._first = {key: array[0] for key, array in self._raw.items()}
+        blocks = -(-self.count // lanes)
+        edges = [lanes * round(blocks * k / threads) for k in range(threads)] + [self.count]
+        self._parts = [slice(a, b) for a, b in pairwise(edges)]
+        self._orders = [np.arange(part.start, part.stop) for part in self._parts]
+        simulation, limit, self._flown = self.simulations[0], self.options.time_limit, []
+        for part in self._parts:
+            own = slice(part.start // lanes, -(-part.stop // lanes))
+            task = pack_task(simulation.vehicle, simulation.world, limit, lanes, part)
+            self._flown.append((part, task, now.rows[part], now.obstacles[own], now.closest[own]))
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        shared = ("perceived", "_raw", "_logs", "_first", "_flown", "_pool")
+        return {name: value for name, value in self.__dict__.items() if name not in shared}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def observation_of(self, row: int) -> Any:
+        """Return a new observation of a row."""
+        if self.egocentric is not None:
+            return self.seen[row].copy()
+        views = {key: array[row] for key, array in self._raw.items()} if row else self._first
+        return {key: array.copy() for key, array in views.items()}
+
+    def new_observation(self) -> Any:
+        """Return room for an observation of all rows."""
+        if self.egocentric is not None:
+            return np.empty(self.seen.shape, np.float32)
+        return {} if self._pool is None else {key: np.empty(array.shape) for key, array in self._raw.items()}
+
+    def observe(self, part: slice, out: Any) -> None:
+        """Copy what a part of the rows shows now into an observation of all."""
+        if self.egocentric is not None:
+            out[part] = self.seen[part]
+        elif self._pool is None:
+            out.update((key, array.copy()) for key, array in self._raw.items())
+        else:
+            for key, array in self._raw.items():
+                out[key][part] = array[part]
+
+    def references(self, actions: ArrayLike) -> NDArray[np.float64]:
+        """Return the references (n, 4) that actions stand for, as they are flown.
+
+        Raises ValueError for actions of another shape or that are not finite.
         """
-        count = self.options.num_obstacles
-        starts, goals = np.empty((len(rows), 4)), np.empty((len(rows), 3))
-        spheres = np.empty((len(rows), count, 4))
-        drawn = [k for k, scenario in enumerate(scenarios) if scenario is None]
-        if drawn:
-            self._draw(rows, drawn, generators, starts, goals, spheres)
-        for k, scenario in enumerate(scenarios):
-            if scenario is not None:
-                starts[k], goals[k] = scenario.start, scenario.goal
-                starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
-                given = len(scenario.obstacles)
-                spheres[k, :given] = scenario.obstacles
-                spheres[k, given:] = (_NOWHERE, 0.0, 0.0, 0.0)
-        begin_rows(*self.episodes, count, LANES, self._task, rows, starts, goals, spheres, self.report)
+        if self.egocentric is None:
+            given = checked(actions, (self.count, 4), REFERENCE, np.float64)
+            references = np.minimum(np.maximum(given, self.low), self.high)
+        else:
+            offsets = checked(actions, (self.count, 3), "offsets in [-1, 1]", np.float32)
+            references = self.egocentric.place(self.perceived, self.memory, offsets)
+        if self.reference_filter is not None:
+            references = self.reference_filter(self.perceived, references, self.starting.copy())
+        return references
+
+    def advance(self, references: NDArray[np.float64], k: int = 0) -> None:
+        """Fly part k of the rows one period toward references (n, 4), then judge them."""
+        part, task, rows, obstacles, closest = self._flown[k]
+        own = references if len(self._parts) == 1 else references[part]
+        self.simulations[k].advance(rows, own, obstacles, closest, self._obstacles)
+        settle(*self.episodes, task)
+
+    def look(self, rows: NDArray[np.int64]) -> None:
+        """Look at rows (k,), once a period."""
+        if self.egocentric is not None:
+            self.egocentric.look(self.perceived, self.memory, rows, self.seen)
+
+    def note_crossings(self, part: slice) -> None:
+        """Append the crossings of this period; lists handed out before are left alone."""
+        counts = self.episodes.report[part, -1]
+        for k in counts.nonzero()[0].tolist():
+            row = part.start + k
+            self.transitions[row] = [*self.transitions[row], *crossings_of(self._logs[row], int(counts[k]))]
+
+    def fly(self, references: NDArray[np.float64], *, same_step: bool) -> Flown:
+        """Fly one period toward references (n, 4); rows that had ended before begin anew instead.
+
+        With `same_step`, rows that end now begin anew at once.
+        """
+        self.starting[:] = False
+        report, now = (np.empty((len(REPORT), self.count)) for _ in range(2))
+        last_observations, last_transitions = np.full((2, self.count if same_step else 0), None, dtype=object)
+        flown = Flown(report if same_step else now, now, self.new_observation(), last_observations, last_transitions)
+        self._spread(lambda k: self._fly_part(k, references, flown))
+        return flown
+
+    def _fly_part(self, k: int, references: NDArray[np.float64], flown: Flown) -> None:
+        part, report, ended = self._parts[k], self.episodes.report, self.ended[self._parts[k]]
+        again = part.start + ended.nonzero()[0]
+        # before they fly: while one thread draws, the others advance
+        missions = self.missions_of(again) if again.size else None
+        self.advance(references, k)
+        self.note_crossings(part)
+        if missions is not None:
+            self.begin(again, missions, look=False)
+        self.look(self._orders[k])
+        np.not_equal(report[part, OUTCOME], RUNNING, out=ended)
+        if flown.report is not flown.now:
+            flown.report[:, part] = report[part].T
+            again = part.start + ended.nonzero()[0]
+            for row in again.tolist():
+                flown.last_observations[row] = self.observation_of(row)
+                flown.last_transitions[row] = self.transitions[row]
+            if again.size:
+                self.begin(again, self.missions_of(again))
+        flown.now[:, part] = report[part].T
+        self.observe(part, flown.observation)
+
+    def _spread(self, work: Callable[[int], None]) -> None:
+        """Do every part's work, the first of them in this thread."""
+        jobs = [] if self._pool is None else [self._pool.submit(work, k) for k in range(1, len(self._parts))]
+        try:
+            work(0)
+        finally:
+            for job in jobs:
+                job.result()
+
+    def missions_of(self, rows: NDArray[np.int64], scenarios: Sequence[Scenario | None] | None = None) -> Missions:
+        """Return what episodes of rows (k,) begin with: scenarios (k,), None being drawn from the row's own stream."""
+        count, listed = len(rows), rows.tolist()
+        missions = Missions(np.empty((count, 4)), np.empty((count, 3)), np.empty((count, self._obstacles, 4)))
+        drawn = np.arange(count)
+        if scenarios is not None:
+            drawn = np.array([k for k in range(count) if scenarios[k] is None], np.int64)
+            for k, scenario in enumerate(scenarios):
+                if scenario is not None:
+                    _load(scenario, k, missions)
+        if drawn.size:
+            self._draw([self.generators[listed[k]] for k in drawn], drawn, missions)
+        return missions
+
+    def begin(self, rows: NDArray[np.int64], missions: Missions, *, look: bool = True) -> None:
+        """Begin the episodes of rows (k,), and look at them unless that is still to come in this period."""
+        begin_rows(self.episodes, missions, rows, self._flown[0][1])
+        for row in rows.tolist():
+            self.transitions[row] = []
+        self.ended[rows], self.starting[rows] = False, True
+        if self.egocentric is not None:
+            self.memory[rows, LEAST] = np.inf
+            if look:
+                self.look(rows)
+
+    def _draw(self, generators: list[np.random.Generator], drawn: NDArray[np.int64], missions: Missions) -> None:
+        """Draw missions, each from its own stream: one kernel call places all, the rare rest goes one by one."""
+        numbers = np.empty((len(drawn), first_numbers(self.law)))
+        for generator, line in zip(generators, numbers):
+            generator.random(out=line)
+        solved = place_many(*self._prepared, numbers, drawn, *missions)
+        if not solved.all():
+            for i in np.flatnonzero(~solved).tolist():
+                start, goal, spheres = (array[drawn[i]] for array in missions)
+                draw(self.law, self._prepared, generators[i], start, goal, spheres, numbers[i])
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""
-        block, lane = divmod(row, LANES)
-        found = self.episodes.obstacles[block].reshape(self.options.num_obstacles, 4, LANES)[:, :, lane]
+        block, lane = divmod(row, self.lanes)
+        found = self.episodes.obstacles[block].reshape(self.options.num_obstacles, 4, self.lanes)[:, :, lane]
         return found[found[:, 3] > 0.0]
 
-    def _draw(
-        self,
-        rows: NDArray[np.intp],
-        drawn: list[int],
-        generators: Sequence[np.random.Generator],
-        starts: NDArray[np.float64],
-        goals: NDArray[np.float64],
-        spheres: NDArray[np.float64],
-    ) -> None:
-        """Draw scenarios, each from its row's own stream: one kernel call places all, the rare rest goes one by one."""
-        law = self._law
-        numbers = np.empty((len(drawn), first_numbers(law)))
-        for line, k in zip(numbers, drawn, strict=True):
-            generators[rows[k]].random(out=line)
-        chosen = np.array(drawn)
-        solved = place_many(*self._prepared, numbers, chosen, starts, goals, spheres)
-        for line, k, done in zip(numbers, drawn, solved, strict=True):
-            if not done:
-                draw(law, self._prepared, generators[rows[k]], starts[k], goals[k], spheres[k], line)
+    def show(self, rows: NDArray[np.int64]) -> None:
+        """Begin anew on the screen, where rows begin an episode."""
+        for row in rows.tolist():
+            self.screen.begin(row, self.episodes.rows, self.episodes.seen, self.spheres(row))
+
+    def render(self, row: int) -> NDArray[np.uint8] | None:
+        """Return a new picture of a row (height, width, 3), or None if there is none or it is shown in a window."""
+        return self.screen.render(row, self.episodes.rows, self.episodes.seen)
+
+
+def _load(scenario: Scenario, k: int, missions: Missions) -> None:
+    """Make a scenario the k-th mission, with nothing in the place of the spheres it lacks."""
+    given = len(scenario.obstacles)
+    missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
+    missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
+    missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE

@@ -1,8 +1,6 @@
 """`HydroneEnv`: one vehicle and one mission as a Gymnasium environment."""
 
 import copy
-import inspect
-import math
 from typing import Any
 
 import gymnasium as gym
@@ -10,21 +8,21 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
-from hydrone_gym.envs.egocentric import egocentric_space, relative_action_space
-from hydrone_gym.envs.egocentric_rows import EgocentricRows
-from hydrone_gym.envs.info import conclude, crossings_of, info_of
-from hydrone_gym.envs.options import Options
+from hydrone_gym.envs.batch import EpisodeBatch
+from hydrone_gym.envs.info import conclude, info_of
+from hydrone_gym.envs.options import Options, known_options, takes, with_options
 from hydrone_gym.envs.requests import check_running, check_scenario, load_reference, requested_scenario
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.snapshot import Snapshot
-from hydrone_gym.envs.spaces import action_space, observation_space
-from hydrone_gym.envs.task import REPORT, begin_rows, copy_episodes, new_episodes, pack_task, settle
-from hydrone_gym.rendering.view import new_screen
+from hydrone_gym.envs.task import OUTCOME, Episodes
+from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.vehicle import Vehicle, named_vehicle
+from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.generator import generate
 from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
+
+__all__ = ["HydroneEnv", "known_options"]
 
 Observation = dict[str, NDArray[np.float64]] | NDArray[np.float32]
 _ONLY = np.zeros(1, np.int64)
@@ -95,21 +93,7 @@ class HydroneEnv(gym.Env[Any, Any]):
     ## Arguments
     All by keyword, also through `gymnasium.make`:
 
-    - `mission`: "air_to_water", "water_to_air" or "random"; set by the id.
-    - `num_obstacles` (20): number of spheres; at least as many as a given scenario has.
-    - `obstacle_radius` ((0.5, 1.5)): least and greatest radius, m.
-    - `sensor_range` (3.0): m.
-    - `vehicle` ("paper"): "paper", "physical" or a `Vehicle`.
-    - `period` (0.5): seconds a step, a multiple of 0.05.
-    - `vertical_mode` (True): hold still laterally inside the transition zone.
-    - `rough_transition` ("fail"): "fail" ends an episode at a rough crossing, "count" only notes it.
-    - `time_limit` (120.0): s.
-    - `interface` ("world"): the spaces above; "egocentric": a flat (68,) observation and (3,) relative actions for
-      learners, documented in `hydrone_gym.envs.egocentric`.
-    - `render_mode` (None): "rgb_array" for pictures, "human" for a window; `hydrone_gym.rendering` describes them.
-    - `render_size` ((640, 480)): width and height of pictures in pixels; `camera` ("overview"): or "chase".
-
-    Raises TypeError for an unknown option and ValueError for a value out of range.
+    `Options` lists them.
 
     ## Version History
     - v0: first version.
@@ -117,57 +101,22 @@ class HydroneEnv(gym.Env[Any, Any]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 2}
 
-    def __init__(
-        self,
-        *,
-        mission: str = "random",
-        num_obstacles: int = 20,
-        obstacle_radius: tuple[float, float] = (0.5, 1.5),
-        sensor_range: float = 3.0,
-        vehicle: str | Vehicle = "paper",
-        period: float = 0.5,
-        vertical_mode: bool = True,
-        rough_transition: str = "fail",
-        time_limit: float = 120.0,
-        interface: str = "world",
-        render_mode: str | None = None,
-        render_size: tuple[int, int] = (640, 480),
-        camera: str = "overview",
-        **unknown: object,
-    ) -> None:
-        """Check the options and set up the simulation."""
-        if unknown:
-            raise TypeError(f"unknown option {', '.join(map(repr, unknown))}; known are {', '.join(known_options())}")
-        self.render_mode = render_mode
-        self.options = Options(
-            mission=mission,
-            num_obstacles=num_obstacles,
-            obstacle_radius=obstacle_radius,
-            sensor_range=sensor_range,
-            vehicle=named_vehicle(vehicle),
-            period=period,
-            vertical_mode=vertical_mode,
-            rough_transition=rough_transition,
-            time_limit=time_limit,
-            interface=interface,
-        )
-        self.simulation = Simulation(self.options.vehicle, self.options.world, period, lanes=1)
-        self._screen = new_screen(render_mode, render_size, camera, self.simulation)
-        self.metadata = {**self.metadata, "render_fps": 1.0 / period}
-        references = action_space(self.world)
-        space = observation_space(self.vehicle, self.world, self.options.num_obstacles)
-        self._sphere_space: Any = space["obstacles"]
-        self._lowest, self._highest = references.low.astype(np.float64), references.high.astype(np.float64)
-        self._egocentric = EgocentricRows(self.options, 1) if interface == "egocentric" else None
-        self.action_space = references if self._egocentric is None else relative_action_space()
-        self.observation_space = space if self._egocentric is None else egocentric_space()
-        self._law = self.options.law
+    @takes(Options)
+    def __init__(self, options: Options) -> None:
+        """Set up the simulation."""
+        self.options = options
+        self.render_mode = options.render_mode
+        self.metadata = {**self.metadata, "render_fps": 1.0 / options.period}
+        self._core = EpisodeBatch(options, 1, lanes=1, render_modes=("rgb_array", "human"))
+        self.action_space, self.observation_space = self._core.action_space, self._core.observation_space
         self._reference = np.zeros((1, 4))
-        self._report = np.zeros((1, len(REPORT)))
-        self._task = pack_task(self.vehicle, self.world, time_limit)
-        self._episodes = new_episodes(1, self.options.num_obstacles, lanes=1)
         self._scenario: Scenario | None = None
-        self._transitions: list[dict[str, Any]] = []
+        self._outcome: float | None = None  # a plain number: comparing with the enumeration takes microseconds
+
+    @property
+    def simulation(self) -> Simulation:
+        """What advances it: the truth."""
+        return self._core.simulations[0]
 
     @property
     def vehicle(self) -> Vehicle:
@@ -197,25 +146,15 @@ class HydroneEnv(gym.Env[Any, Any]):
             ValueError: an unknown key, or a scenario that is impossible in this world.
         """
         super().reset(seed=seed)
-        scenario = requested_scenario(options)
+        core, scenario = self._core, requested_scenario(options)
         if scenario is None:
-            scenario = generate(self._law, self.world, self.vehicle.radius, self.np_random)
+            scenario = generate(core.law, self.world, self.vehicle.radius, self.np_random)
         else:
-            check_scenario(scenario, self.world, self.vehicle.radius, self._sphere_space)
-        self._begin(scenario)
-        return self._observation(), info_of(self._report[0].tolist(), self._transitions)
-
-    def _begin(self, scenario: Scenario) -> None:
-        """Put the vehicle at the start of a scenario, with nothing known but what is in range there."""
-        x, y, z, yaw = scenario.start
-        starts = np.array([[x, y, z, math.remainder(yaw, 2.0 * math.pi)]])
-        goals, spheres = np.array([scenario.goal]), scenario.obstacles[None]
-        begin_rows(*self._episodes, spheres.shape[1], 1, self._task, _ONLY, starts, goals, spheres, self._report)
-        self._scenario = scenario
-        self._transitions = []
-        if self._egocentric is not None:
-            self._egocentric.begin(self._episodes, _ONLY)
-        self._screen.begin(0, self._episodes.rows, self._episodes.seen, scenario.obstacles)
+            check_scenario(scenario, self.world, self.vehicle.radius, core.sphere_space)
+        core.begin(_ONLY, core.missions_of(_ONLY, [scenario]))
+        self._scenario, self._outcome = scenario, RUNNING
+        core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
+        return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0])
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period with the reference moving to the action; returns are those of the class's description.
@@ -227,53 +166,46 @@ class HydroneEnv(gym.Env[Any, Any]):
             ValueError: an action of another shape, or not finite.
             ResetNeeded: before the first reset, or after the end of an episode.
         """
-        now = self._episodes
-        check_running(now.rows["outcome"][0], self._scenario is not None)
-        if self._egocentric is None:
-            load_reference(action, self._lowest, self._highest, self._reference[0])
+        core = self._core
+        now, screen = core.episodes, core.screen
+        check_running(self._outcome)
+        if core.egocentric is None:
+            references = self._reference
+            load_reference(action, core.low, core.high, references[0])
         else:
-            self._reference[:] = self._egocentric.references(np.asarray(action)[None], now)
-        self._screen.add(0, now.rows, self._reference)
-        count = len(self.scenario.obstacles)
-        self.simulation.advance(now.rows, self._reference, now.obstacles, now.closest, count)
-        settle(*now, count, 1, self._task, _ONLY, self._report)
-        if self._egocentric is not None:
-            self._egocentric.look(now)
-        self._screen.update(now.rows, now.seen)
-        report = self._report[0].tolist()
+            references = core.references(np.asarray(action)[None])
+        screen.add(0, now.rows, references)
+        core.advance(references)
+        core.look(_ONLY)
+        screen.update(now.rows, now.seen)
+        report = now.report[0].tolist()
         if report[-1] > 0.0:
-            self._transitions += crossings_of(now.rows["crossing_log"][0], int(report[-1]))
-        info = info_of(report, self._transitions)
+            core.note_crossings(slice(0, 1))
+        self._outcome = report[OUTCOME]
+        info = info_of(report, core.transitions[0])
         terminated, truncated = conclude(info)
-        return self._observation(), report[len(TERMS)], terminated, truncated, info
-
-    def _observation(self) -> Observation:
-        if self._egocentric is not None:
-            return self._egocentric.observation()[0]
-        rows = self._episodes.rows
-        observation = {key: rows[key][0].copy() for key in ("state", "integral", "reference", "goal")}
-        observation["obstacles"] = self._episodes.known[0].copy()
-        return observation
+        return core.observation_of(0), report[len(TERMS)], terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a new picture (height, width, 3), or None with a window; raises ResetNeeded before the first reset."""
-        return self._screen.render(0, self._episodes.rows, self._episodes.seen)
+        return self._core.render(0)
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        self._screen.close()
+        self._core.screen.close()
 
     def get_state(self) -> Snapshot:
         """Return a complete snapshot of the episode and the random stream; raises ResetNeeded before reset."""
+        core = self._core
         return Snapshot(
             options=self.options,
             scenario=self.scenario,
-            episodes=copy_episodes(self._episodes),
-            transitions=tuple(dict(crossing) for crossing in self._transitions),
+            episodes=Episodes._make(array.copy() for array in core.episodes),
+            transitions=tuple(dict(crossing) for crossing in core.transitions[0]),
             random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
             seed=self._np_random_seed,
-            egocentric=copy.deepcopy(self._egocentric),
-            track=self._screen.track(0),
+            egocentric=(core.memory.copy(), core.seen.copy()),
+            track=core.screen.track(0),
         )
 
     def set_state(self, snapshot: Snapshot) -> None:
@@ -284,15 +216,15 @@ class HydroneEnv(gym.Env[Any, Any]):
         if not isinstance(snapshot, Snapshot):
             raise TypeError(f"snapshot must come from get_state(), got {type(snapshot).__name__}")
         snapshot.check_options(self.options)
-        self._episodes = copy_episodes(snapshot.episodes)
-        self._scenario = snapshot.scenario
-        self._egocentric = copy.deepcopy(snapshot.egocentric)
-        self._transitions = [dict(crossing) for crossing in snapshot.transitions]
+        core, self._scenario = self._core, snapshot.scenario
+        self._outcome = float(snapshot.episodes.report[0, OUTCOME])
+        own: list[np.ndarray] = [*core.episodes, core.memory, core.seen]
+        for array, kept in zip(own, (*snapshot.episodes, *snapshot.egocentric), strict=True):
+            array[...] = kept
+        core.transitions[0] = [dict(crossing) for crossing in snapshot.transitions]
         self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
         self._np_random_seed = snapshot.seed
-        self._screen.restore(0, self._episodes.rows, self.scenario.obstacles, snapshot.track)
+        core.screen.restore(0, core.episodes.rows, self.scenario.obstacles, snapshot.track)
 
 
-def known_options() -> tuple[str, ...]:
-    """Names of the options every environment of this package takes."""
-    return tuple(inspect.getfullargspec(HydroneEnv.__init__).kwonlyargs)
+HydroneEnv.__doc__ = with_options(HydroneEnv.__doc__, Options)

@@ -14,7 +14,7 @@ from hydrone_gym.simulation.outcome import RUNNING, Outcome
 from hydrone_gym.world.scenario import Scenario, load_scenario, validate
 from hydrone_gym.world.world import World
 
-_REFERENCE = "[x, y, z, psi] (m, m, m, rad)"
+REFERENCE = "[x, y, z, psi] (m, m, m, rad)"
 
 
 def requested_scenario(options: dict[str, Any] | None) -> Scenario | None:
@@ -79,11 +79,11 @@ def check_scenario(scenario: Scenario, world: World, vehicle_radius: float, boun
             raise ValueError(f"obstacle {index} must lie between {low} and {high} (m), got {sphere.tolist()}")
 
 
-def check_running(outcome: float, begun: bool) -> None:
-    """Raise ResetNeeded unless an episode has begun and not ended."""
-    if not begun:
+def check_running(outcome: float | None) -> None:
+    """Raise ResetNeeded unless an episode has begun (None: it has not) and not ended."""
+    if outcome is None:
         raise ResetNeeded("step() was called before reset(): call reset() first")
-    if outcome != RUNNING:  # a plain number: comparing with the enumeration takes microseconds
+    if outcome != RUNNING:
         raise ResetNeeded(
             f"step() was called after the episode ended with {Outcome(int(outcome)).name}: call reset() first"
         )
@@ -99,28 +99,26 @@ def load_reference(
     try:
         reference = np.asarray(action, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"action must be four numbers {_REFERENCE}, got {action!r}") from None
+        raise ValueError(f"action must be four numbers {REFERENCE}, got {action!r}") from None
     if reference.shape != (4,):
-        raise ValueError(f"action must have shape (4,) {_REFERENCE}, got {reference.shape}")
+        raise ValueError(f"action must have shape (4,) {REFERENCE}, got {reference.shape}")
     # on four numbers math is several times faster than NumPy
     if not all(map(math.isfinite, reference.tolist())):
-        raise ValueError(f"action must be finite {_REFERENCE}, got {reference}")
+        raise ValueError(f"action must be finite {REFERENCE}, got {reference}")
     np.maximum(reference, low, out=out)
     np.minimum(out, high, out=out)
 
 
-def load_references(
-    actions: ArrayLike, low: NDArray[np.float64], high: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
-    """Check the actions of `count` rows and return them (count, 4), clipped to [low, high].
+def checked(actions: ArrayLike, shape: tuple[int, int], words: str, dtype: type) -> NDArray:
+    """Return the actions of many rows as an array; `words` say what they are.
 
     Raises ValueError for another shape, or naming the rows that are not finite.
     """
-    references = np.asarray(actions, dtype=np.float64)
-    if references.shape != (count, 4):
-        raise ValueError(f"actions must have shape ({count}, 4) {_REFERENCE}, got {references.shape}")
-    finite = np.isfinite(references)
+    array: NDArray = np.asarray(actions, dtype)
+    if array.shape != shape:
+        raise ValueError(f"actions must have shape {shape} {words}, got {array.shape}")
+    finite = np.isfinite(array)
     if not finite.all():
         bad = np.flatnonzero(~finite.all(axis=1)).tolist()
-        raise ValueError(f"actions must be finite {_REFERENCE}; rows {bad} are not")
-    return np.minimum(np.maximum(references, low), high)
+        raise ValueError(f"actions must be finite {words}; rows {bad} are not")
+    return array

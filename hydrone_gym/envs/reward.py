@@ -23,26 +23,26 @@ _COUNT = len(TERMS)
 
 
 @inlined
-def write_reward(out, n, before, after, vx, vy, vz, outcome):
-    """Write the terms of row n in the order of `TERMS`, then their sum from left to right.
+def write_reward(out, before, after, velocity, outcome):
+    """Write the terms of a row in the order of `TERMS`, then their sum from left to right.
 
     Args:
-        out: (rows, K) float64, K > len(TERMS).
-        n: row.
+        out: (K,) float64, K > len(TERMS).
         before, after: time-to-go (s) at the beginning and at the end of the period.
-        vx, vy, vz: velocity (m/s) at its end.
+        velocity: (vx, vy, vz) in m/s at its end.
         outcome: an `Outcome`.
     """
+    vx, vy, vz = velocity
     slow = np.sqrt(vx * vx + vy * vy + vz * vz) < SLOW_SPEED
-    out[n, 0] = SCALE * PROGRESS * (before - after)
-    out[n, 1] = SCALE * TIME
-    out[n, 2] = SCALE * SLOW if slow else 0.0
-    out[n, 3] = SCALE * GOAL_REACHED if outcome == GOAL else 0.0
-    out[n, 4] = SCALE * FAILURE if outcome == COLLISION else 0.0
-    out[n, 5] = SCALE * FAILURE if outcome == ROUGH_TRANSITION else 0.0
-    out[n, 6] = SCALE * FAILURE if outcome == OUT_OF_BOUNDS else 0.0
-    out[n, 7] = SCALE * FAILURE if outcome == DIVERGED else 0.0
+    out[0] = SCALE * PROGRESS * (before - after)
+    out[1] = SCALE * TIME
+    out[2] = SCALE * SLOW if slow else 0.0
+    out[3] = SCALE * GOAL_REACHED if outcome == GOAL else 0.0
+    out[4] = SCALE * FAILURE if outcome == COLLISION else 0.0
+    out[5] = SCALE * FAILURE if outcome == ROUGH_TRANSITION else 0.0
+    out[6] = SCALE * FAILURE if outcome == OUT_OF_BOUNDS else 0.0
+    out[7] = SCALE * FAILURE if outcome == DIVERGED else 0.0
     total = 0.0
     for k in range(_COUNT):
-        total += out[n, k]
-    out[n, _COUNT] = total
+        total += out[k]
+    out[_COUNT] = total

@@ -1,9 +1,11 @@
 """A complete snapshot of an environment: enough to go on bit for bit, in this process or another."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
-from hydrone_gym.envs.egocentric_rows import EgocentricRows
+import numpy as np
+from numpy.typing import NDArray
+
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import Episodes
 from hydrone_gym.rendering.track import Track
@@ -21,7 +23,7 @@ class Snapshot:
         transitions: the crossings so far.
         random_state: state of the bit generator that draws scenarios.
         seed: the seed it was made from.
-        egocentric: the memory of `interface="egocentric"`, else None.
+        egocentric: memory and last observation of `interface="egocentric"`.
         track: the path flown so far, for pictures; None from an environment without `render_mode`.
     """
 
@@ -31,15 +33,14 @@ class Snapshot:
     transitions: tuple[dict[str, Any], ...]
     random_state: dict[str, Any]
     seed: int | None
-    egocentric: EgocentricRows | None
+    egocentric: tuple[NDArray[np.float64], NDArray[np.float32]]
     track: Track | None = None
 
     def check_options(self, options: Options) -> None:
         """Raise ValueError naming every option in which another environment differs."""
         differing = [
-            f"{spec.name} (snapshot {getattr(self.options, spec.name)!r}, here {getattr(options, spec.name)!r})"
-            for spec in fields(Options)
-            if getattr(self.options, spec.name) != getattr(options, spec.name)
+            f"{name} (snapshot {getattr(self.options, name)!r}, here {getattr(options, name)!r})"
+            for name in self.options.differences(options)
         ]
         if differing:
             raise ValueError(f"snapshot is of an environment with other options: {', '.join(differing)}")

@@ -1,4 +1,4 @@
-"""The spaces of `interface="world"`: finite bounds that no flight can leave."""
+"""The spaces of both interfaces; those of `interface="world"` have finite bounds that no flight can leave."""
 
 import math
 
@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from hydrone_gym.control.laws import envelope_of
+from hydrone_gym.perception.egocentric import LIMIT, OBSERVATION_SIZE
 from hydrone_gym.simulation.advance import RATE_BOUND, SPEED_BOUND, TICK
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
@@ -41,6 +42,16 @@ def observation_space(vehicle: Vehicle, world: World, num_obstacles: int) -> spa
             ),
         }
     )
+
+
+def relative_action_space() -> spaces.Box:
+    """Actions of `interface="egocentric"`: offsets in the mission frame, (3,) float32 in [-1, 1]."""
+    return spaces.Box(-1.0, 1.0, (3,), np.float32)
+
+
+def egocentric_space() -> spaces.Box:
+    """Observations of `interface="egocentric"`, (68,) float32 in [-5, 5]."""
+    return spaces.Box(-LIMIT, LIMIT, (OBSERVATION_SIZE,), np.float32)
 
 
 def _box(low: np.ndarray, high: np.ndarray) -> spaces.Box:

@@ -12,22 +12,17 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from hydrone_gym.envs.batch import EpisodeBatch
-from hydrone_gym.envs.egocentric import egocentric_space, relative_action_space
-from hydrone_gym.envs.egocentric_rows import EgocentricRows
-from hydrone_gym.envs.info import batch_info, crossings_of
-from hydrone_gym.envs.options import Options
-from hydrone_gym.envs.requests import check_scenario, load_references, requested_rows
+from hydrone_gym.envs.batch import EpisodeBatch, ReferenceFilter
+from hydrone_gym.envs.info import batch_info
+from hydrone_gym.envs.options import VectorOptions, takes, with_options
+from hydrone_gym.envs.requests import check_scenario, requested_rows
 from hydrone_gym.envs.reward import TERMS
-from hydrone_gym.envs.spaces import action_space, observation_space
-from hydrone_gym.envs.task import REPORT
-from hydrone_gym.rendering.view import new_screen
+from hydrone_gym.envs.task import OUTCOME
 from hydrone_gym.simulation.outcome import GOAL, RUNNING, TIMEOUT
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.vehicle import Vehicle, named_vehicle
+from hydrone_gym.simulation.storage import LANES
 
 _REWARD = len(TERMS)
-_OUTCOME = REPORT.index("outcome")
 
 
 class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
@@ -41,16 +36,11 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     an integer array. At the end of an episode `info["is_success"]` is set, and in SAME_STEP mode `final_obs` and
     `final_info`.
 
-    Args besides the options of `HydroneEnv`:
-        num_envs: number of rows.
-        autoreset_mode: "NextStep" (default), "SameStep", "Disabled" or a `gymnasium.vector.AutoresetMode`.
-        threads: threads to spread whole blocks of rows over; used from 512 rows on.
-        max_episode_steps: replaces `time_limit` if given, in periods.
+    Options besides those of `HydroneEnv`, all by keyword but `num_envs`:
+
+    `VectorOptions` lists them.
 
     `render_mode` is None or "rgb_array": `render()` returns a tuple of pictures, one a row.
-
-    `egocentric` translates for `interface="egocentric"`; another `EgocentricRows` may take its place before the first
-    reset, to change the references that actions stand for.
 
     Reset options: `scenario`, one `Scenario` (or path) for all rows or a sequence of one a row, None entries being
     drawn; `reset_mask` (n,) bool, which rows to reset.
@@ -62,66 +52,33 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        mission: str = "random",
-        num_obstacles: int = 20,
-        obstacle_radius: tuple[float, float] = (0.5, 1.5),
-        sensor_range: float = 3.0,
-        vehicle: str | Vehicle = "paper",
-        period: float = 0.5,
-        vertical_mode: bool = True,
-        rough_transition: str = "fail",
-        time_limit: float = 120.0,
-        interface: str = "world",
-        render_mode: str | None = None,
-        render_size: tuple[int, int] = (640, 480),
-        camera: str = "overview",
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int = 1,
-        max_episode_steps: int | None = None,
-    ) -> None:
-        """Check the options and make room for the rows."""
-        self.num_envs = _whole("num_envs", num_envs)
-        if max_episode_steps is not None:
-            time_limit = _whole("max_episode_steps", max_episode_steps) * period
-        self.options = Options(
-            mission=mission,
-            num_obstacles=num_obstacles,
-            obstacle_radius=obstacle_radius,
-            sensor_range=sensor_range,
-            vehicle=named_vehicle(vehicle),
-            period=period,
-            vertical_mode=vertical_mode,
-            rough_transition=rough_transition,
-            time_limit=time_limit,
-            interface=interface,
-        )
-        self.render_mode = render_mode
-        mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": mode, "render_fps": 1.0 / period}
-        self._batch = EpisodeBatch(self.options, self.num_envs, _whole("threads", threads))
-        self._screen = new_screen(render_mode, render_size, camera, self.simulation, modes=("rgb_array",))
-        world = self.options.world
-        references = action_space(world)
-        raw = observation_space(self.options.vehicle, world, self.options.num_obstacles)
-        self._sphere_space: Any = raw["obstacles"]
-        self.egocentric = EgocentricRows(self.options, self.num_envs) if interface == "egocentric" else None
-        self.single_action_space = references if self.egocentric is None else relative_action_space()
-        self.single_observation_space = raw if self.egocentric is None else egocentric_space()
+    @takes(VectorOptions)
+    def __init__(self, options: VectorOptions) -> None:
+        """Make room for the rows."""
+        self.num_envs = options.num_envs
+        self.options = options.of_a_row
+        self.render_mode = options.render_mode
+        self._mode = AutoresetMode(options.autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self._mode, "render_fps": 1.0 / options.period}
+        self._core = EpisodeBatch(self.options, self.num_envs, LANES, options.threads)
+        self.single_action_space = self._core.action_space
+        self.single_observation_space = self._core.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._low, self._high = references.low.astype(np.float64), references.high.astype(np.float64)
-        self._generators: list[np.random.Generator] = []
-        self._transitions = np.full(self.num_envs, None, dtype=object)
-        self._ended = np.ones(self.num_envs, bool)
 
     @property
     def simulation(self) -> Simulation:
-        """The simulation that steps it: vehicle, world and period for planners."""
-        return self._batch.simulations[0]
+        """What advances its rows, or the first part of them: the truth."""
+        return self._core.simulations[0]
+
+    def filter_references(self, function: ReferenceFilter | None) -> None:
+        """Let references pass through a function before they are flown, in every step from now on; None ends that.
+
+        The function gets what is perceived of the rows (a `Perceived`, not to be changed), the references (n, 4) that
+        the actions stand for, in m and rad, and where an episode has begun since it was last called, (n,) bool. It
+        returns the references (n, 4) to fly.
+        """
+        self._core.reference_filter = function
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -135,38 +92,31 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         Raises:
             ValueError, TypeError: an unknown option, a wrong mask, an impossible scenario.
         """
-        rows, scenarios = requested_rows(options, self.num_envs)
+        (rows, scenarios), simulation = requested_rows(options, self.num_envs), self.simulation
         for scenario in scenarios:
             if scenario is not None:
-                check_scenario(scenario, self.options.world, self.options.vehicle.radius, self._sphere_space)
+                check_scenario(scenario, simulation.world, simulation.vehicle.radius, self._core.sphere_space)
         self._seed(seed, rows)
-        self._begin(rows, scenarios)
+        self._core.begin(rows, self._core.missions_of(rows, scenarios))
+        if self.render_mode is not None:
+            self._core.show(rows)
         mask = np.zeros(self.num_envs, bool)
         mask[rows] = True
-        return self._observation(), batch_info(self._batch.report, self._transitions, mask)
+        observation = self._core.new_observation()
+        self._core.observe(slice(0, self.num_envs), observation)
+        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, mask)
 
     def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
         seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not _many(seed) else list(seed)  # type: ignore[arg-type, operator]
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
-        if not self._generators:
-            self._generators = [seeding.np_random(None)[0] for _ in range(self.num_envs)]
+        streams = self._core.generators
+        if not streams:
+            streams += [seeding.np_random(None)[0] for _ in range(self.num_envs)]
         for row in rows:
             if seeds[row] is not None:
-                self._generators[row] = seeding.np_random(seeds[row])[0]
-
-    def _begin(self, rows: NDArray[np.intp], scenarios: Sequence[Any]) -> None:
-        self._batch.begin(rows, self._generators, scenarios)
-        for row in rows:
-            self._transitions[row] = []
-        self._ended[rows] = False
-        if self.egocentric is not None:
-            self.egocentric.begin(self._batch.episodes, rows)
-        if self.render_mode is not None:
-            now = self._batch.episodes
-            for row in rows.tolist():
-                self._screen.begin(row, now.rows, now.seen, self._batch.spheres(row))
+                streams[row] = seeding.np_random(seeds[row])[0]
 
     def step(
         self, actions: ArrayLike
@@ -183,96 +133,43 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             ValueError: actions of another shape or not finite; nothing has moved then.
             ResetNeeded: before the first reset; in "Disabled" mode also with rows that have ended.
         """
-        if not self._generators:
+        core, same_step = self._core, self._mode == AutoresetMode.SAME_STEP
+        if not core.generators:
             raise ResetNeeded("step() was called before reset(): call reset() first")
-        if self.egocentric is None:
-            references = load_references(actions, self._low, self._high, self.num_envs)
-        else:
-            references = self.egocentric.references(actions, self._batch.episodes)
-        mode = self.metadata["autoreset_mode"]
-        again = np.flatnonzero(self._ended)
-        if mode == AutoresetMode.DISABLED and len(again):
-            raise ResetNeeded(f"step() was called with rows {again.tolist()} ended: reset them with a reset_mask first")
+        if self._mode == AutoresetMode.DISABLED and core.ended.any():
+            ended = np.flatnonzero(core.ended).tolist()
+            raise ResetNeeded(f"step() was called with rows {ended} ended: reset them with a reset_mask first")
+        references = core.references(actions)
         if self.render_mode is not None:
             for row in range(self.num_envs):
-                self._screen.add(row, self._batch.episodes.rows, references)
-        self._batch.advance(references)
-        if self.egocentric is not None:
-            self.egocentric.look(self._batch.episodes)
-        if len(again):
-            self._begin(again, [None] * len(again))
-        report = self._batch.report
-        self._collect_crossings()
-        rewards = report[:, _REWARD].copy()
-        outcome = report[:, _OUTCOME]
-        truncated = outcome == TIMEOUT
-        ended = outcome != RUNNING
-        terminated = ended & ~truncated
-        self._ended = ended.copy()
-        info = self._info(ended, same_step=mode == AutoresetMode.SAME_STEP)
-        return self._observation(), rewards, terminated, truncated, info
+                core.screen.add(row, core.episodes.rows, references)
+        flown = core.fly(references, same_step=same_step)
+        if self.render_mode is not None:
+            core.show(core.starting.nonzero()[0])
+        outcome = flown.report[OUTCOME]
+        truncated, ended = outcome == TIMEOUT, outcome != RUNNING
+        info = batch_info(flown.now, core.transitions)
+        if ended.any():
+            success = {"is_success": outcome == GOAL, "_is_success": ended.copy()}
+            if same_step:
+                last = batch_info(flown.report, flown.last_transitions, ended) | success
+                success = {"final_obs": flown.last_observations, "_final_obs": ended.copy()}
+                success |= {"final_info": last, "_final_info": ended.copy()}
+            info |= success
+        return flown.observation, flown.report[_REWARD].copy(), ended & ~truncated, truncated, info
 
     def render(self) -> tuple[RenderFrame, ...] | None:
         """Return a new picture (height, width, 3) of each row, None without a `render_mode`.
 
         Raises ResetNeeded before the first reset.
         """
-        now = self._batch.episodes
-        first = self._screen.render(0, now.rows, now.seen)
-        rest: Any = (self._screen.render(row, now.rows, now.seen) for row in range(1, self.num_envs))
+        first = self._core.render(0)
+        rest: Any = (self._core.render(row) for row in range(1, self.num_envs))
         return None if first is None else (first, *rest)
 
-    def _collect_crossings(self) -> None:
-        """Append this period's crossings; lists handed out before are left alone."""
-        counts = self._batch.report[:, -1]
-        for row in np.flatnonzero(counts):
-            log = self._batch.episodes.rows["crossing_log"][row]
-            self._transitions[row] = [*self._transitions[row], *crossings_of(log, int(counts[row]))]
 
-    def _info(self, ended: NDArray[np.bool_], *, same_step: bool) -> dict[str, Any]:
-        """Return the info of a step, which says who succeeded; in SAME_STEP mode ended rows begin anew first."""
-        report = self._batch.report
-        if not ended.any():
-            return batch_info(report, self._transitions)
-        success = {"is_success": report[:, _OUTCOME] == GOAL, "_is_success": ended.copy()}
-        if not same_step:
-            return {**batch_info(report, self._transitions), **success}
-        rows = np.flatnonzero(ended)
-        last = self._observation()
-        final = np.full(self.num_envs, None, dtype=object)
-        for row in rows:
-            final[row] = {k: v[row].copy() for k, v in last.items()} if isinstance(last, dict) else last[row].copy()
-        final_info = {**batch_info(report, self._transitions, ended), **success}
-        self._begin(rows, [None] * len(rows))
-        self._ended = np.zeros(self.num_envs, bool)
-        return {
-            **batch_info(report, self._transitions),
-            "final_obs": final,
-            "_final_obs": ended.copy(),
-            "final_info": final_info,
-            "_final_info": ended.copy(),
-        }
-
-    def _observation(self) -> dict[str, NDArray[np.float64]] | NDArray[np.float32]:
-        if self.egocentric is not None:
-            return self.egocentric.observation()
-        now = self._batch.episodes
-        rows = now.rows
-        return {
-            "goal": rows["goal"].copy(),
-            "integral": rows["integral"].copy(),
-            "obstacles": now.known.copy(),
-            "reference": rows["reference"].copy(),
-            "state": rows["state"].copy(),
-        }
+HydroneVectorEnv.__doc__ = with_options(HydroneVectorEnv.__doc__, VectorOptions)
 
 
 def _many(seed: Any) -> bool:
     return seed is not None and not isinstance(seed, int | np.integer)
-
-
-def _whole(name: str, value: Any) -> int:
-    """Return a whole number of at least 1; raises ValueError naming it."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
-    return int(value)

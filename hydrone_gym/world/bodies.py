@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined
 
 BODY = 4  # numbers a body
-NOWHERE = 1e160  # m: its square overflows, so a body there is at distance inf
+NOWHERE = (1e160, 0.0, 0.0, 0.0)  # a body that is not there: its square overflows, so its distance is infinite
 UNIT = np.array([0.0, 0.0, 0.0, 1.0])  # the body that all others are moved and scaled copies of
 
 

@@ -81,7 +81,7 @@ def test_a_flight_is_the_same_on_both_interfaces(folder):
         observation, _, terminated, truncated, _ = raw.step(action)
         seen = flat.step(agent.relative_action(seen[None])[0])[0]
         many = rows.step(actions)[0]
-        np.testing.assert_array_equal(observation["state"], flat.unwrapped._episodes.rows["state"][0])
+        np.testing.assert_array_equal(observation["state"], flat.unwrapped._core.episodes.rows["state"][0])
         start, done = np.array([False]), terminated or truncated
 
 

@@ -15,9 +15,9 @@ from agents.cloning import Cloning, clone, fit, pairs_of, relative_actions
 from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Recording, record
 from hydrone_gym.cli import main
-from hydrone_gym.envs.egocentric import Egocentric
 from hydrone_gym.evaluation import fly
 from hydrone_gym.evaluation.policies import find_policy
+from hydrone_gym.perception.egocentric import Egocentric
 from hydrone_gym.simulation.outcome import Outcome
 
 OPTIONS = {"num_obstacles": 20, "vehicle": "paper"}

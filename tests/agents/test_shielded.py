@@ -8,7 +8,7 @@ from agents.recipe import load_recipe
 from agents.shielded import INTERVENTION, ShieldedVecEnv
 from agents.vec_env import HydroneVecEnv
 from hydrone_gym import Outcome
-from hydrone_gym.envs.egocentric import Egocentric
+from hydrone_gym.perception.egocentric import Egocentric
 from planners.shield import Shield
 
 ID = MISSIONS[0]
@@ -44,7 +44,7 @@ def test_a_shielded_row_flies_as_a_shielded_policy():
         assert done[2] == (terminated or truncated)
         if done[2]:
             break
-        np.testing.assert_array_equal(observation["state"], rows.env._batch.episodes.rows["state"][2])
+        np.testing.assert_array_equal(observation["state"], rows.env._core.episodes.rows["state"][2])
     assert intervened > 0
 
 

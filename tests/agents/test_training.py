@@ -267,7 +267,7 @@ def test_mission_mix_is_its_parts():
     mix.seed(7)
     observation = mix.reset()
     second = mix.parts[1].env
-    goals = second._batch.episodes.rows["goal"]
+    goals = second._core.episodes.rows["goal"]
     np.testing.assert_array_equal(goals, [[-9.0, 9.0, 7.0]] * 2)
     alone = MissionMix({"HydroneGym/WaterToAir-v0": 2})
     alone.seed(10)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hydrone_gym import HYDRONE, World
-from hydrone_gym.envs.egocentric import (
+from hydrone_gym.perception.egocentric import (
     NAMES,
     Egocentric,
 )

@@ -15,6 +15,8 @@ from tests.envs.missions import AIR_TO_AIR, IDS, begin, fly_to, make
 OPTIONS = [
     ({"num_obstacles": -1}, "num_obstacles must be a whole number, not negative, got -1"),
     ({"num_obstacles": 2.5}, "num_obstacles must be a whole number, not negative, got 2.5"),
+    ({"num_obstacles": 1001}, "num_obstacles must be at most 1000: every observation and the storage of every row"),
+    ({"num_obstacles": 100_000_000}, "num_obstacles must be at most 1000: every observation and the storage of every"),
     ({"obstacle_radius": (1.5, 0.5)}, "obstacle_radius must be positive and ascending (m), got (1.5, 0.5)"),
     ({"obstacle_radius": 1.0}, "obstacle_radius must be 2 finite numbers (m), got 1.0"),
     ({"obstacle_radius": (1.0, 9.0)}, "obstacle_radius must be less than 7.5 m, half the shortest edge of the box"),

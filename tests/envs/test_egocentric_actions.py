@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hydrone_gym.envs.egocentric import (
+from hydrone_gym.perception.egocentric import (
     Memory,
 )
 from tests.envs.missions import same

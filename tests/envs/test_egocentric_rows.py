@@ -3,14 +3,17 @@
 import numpy as np
 import pytest
 
-from hydrone_gym.envs.egocentric import (
+from hydrone_gym.envs.spaces import egocentric_space
+from hydrone_gym.perception.egocentric import (
+    LEAST,
     OBSERVATION_SIZE,
     Egocentric,
     Memory,
-    egocentric_space,
+    new_memory,
     observe_rows,
-    place_references,
 )
+from hydrone_gym.perception.perceived import perceive
+from hydrone_gym.perception.relative import place_references
 from tests.envs.missions import AIR_TO_AIR, DIVE, SPHERE_BETWEEN, begin, same
 from tests.envs.raw_observations import EGO, WORLD, random_raw
 from tests.simulation.batches import random_rows
@@ -21,16 +24,16 @@ def test_rows_and_raw_observations_agree_bit_for_bit(scenario):
     """A flight of the raw environment, seen from its storage and from what it returns."""
     env, observation = begin(scenario, rough_transition="count")
     ego, rng = Egocentric(env.simulation), np.random.default_rng(8)
-    starts, least, clock = np.zeros((1, 3)), np.full(1, np.inf), np.zeros(1)
-    out, place, memory = np.empty((1, OBSERVATION_SIZE), np.float32), np.empty((1, 4)), None
+    now, memory = env._core.episodes, None
+    carried, seen = new_memory(1), np.empty((1, OBSERVATION_SIZE), np.float32)
+    perceived = perceive(now.rows, now.known, now.found)
     for _ in range(40):
-        rows, known, found = env._episodes.rows, env._episodes.known, env._episodes.found
-        observe_rows(rows, known, found, starts, least, clock, ego.values, 0, 1, out)
+        ego.look(perceived, carried, np.arange(1), seen)
         flat, memory = ego.observe(observation, memory)
-        assert same(flat, out[0])
+        assert same(flat, seen[0])
         assert flat in egocentric_space()
         action = rng.uniform(-0.2, 1.0, (1, 3)).astype(np.float32)
-        place_references(rows, action, starts, ego.values, 0, 1, place)
+        place = ego.place(perceived, carried, action)
         reference = ego.reference(action[0], observation, memory)
         assert same(reference.astype(np.float64), place[0])
         assert reference in env.action_space
@@ -38,8 +41,7 @@ def test_rows_and_raw_observations_agree_bit_for_bit(scenario):
         assert same(observation["reference"], place[0])
         if terminated or truncated:
             break
-    assert memory.clock.tobytes() == clock.tobytes()
-    assert memory.start.tobytes() == starts.tobytes()
+    assert np.concatenate((memory.start, [memory.least, memory.clock])).tobytes() == carried.tobytes()
 
 
 @pytest.mark.parametrize("count", [1, 7, 64])
@@ -60,18 +62,18 @@ def test_a_batch_is_its_rows_bit_for_bit(count):
         assert same(EGO.reference(action[n], single, own), places[n])
 
 
-def test_parts_of_the_rows_are_left_alone():
+def test_rows_that_are_not_looked_at_are_left_alone():
     rng = np.random.default_rng(2)
-    rows, out = random_rows(rng, 5, WORLD), np.full((5, OBSERVATION_SIZE), 9.0, np.float32)
+    rows, memory, seen = random_rows(rng, 5, WORLD), new_memory(5), np.full((5, OBSERVATION_SIZE), 9.0, np.float32)
     rows["goal"] = 1.0
-    clock, places = np.full(5, 3.0), np.full((5, 4), 9.0)
-    spheres, found, starts = np.zeros((5, 2, 4)), np.zeros(5, np.int64), np.zeros((5, 3))
-    observe_rows(rows, spheres, found, starts, np.full(5, np.inf), clock, EGO.values, 1, 3, out)
-    place_references(rows, np.zeros((5, 3), np.float32), starts, EGO.values, 1, 3, places)
-    assert (out[1:3] <= 5.0).all()
-    assert (out[[0, 3, 4]] == 9.0).all()
-    assert (places[[0, 3, 4]] == 9.0).all()
-    np.testing.assert_array_equal(clock, [3.0, 0.0, 0.0, 3.0, 3.0])
+    memory[:3, LEAST], memory[:, LEAST + 1] = 0.0, 3.0
+    before, perceived = memory.copy(), perceive(rows, np.zeros((5, 2, 4)), np.zeros(5, np.int64))
+    EGO.look(perceived, memory, np.array([1, 3]), seen)
+    assert (seen[[1, 3]] <= 5.0).all()
+    assert (seen[[0, 2, 4]] == 9.0).all()
+    np.testing.assert_array_equal(memory[[0, 2, 4]], before[[0, 2, 4]])
+    np.testing.assert_array_equal(memory[:, LEAST + 1], [3.0, 4.0, 3.0, 0.0, 3.0])
+    np.testing.assert_array_equal(memory[3, :3], rows["state"][3, :3])
 
 
 def test_every_caller_shares_one_compiled_version():

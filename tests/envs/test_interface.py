@@ -94,7 +94,7 @@ def test_observation_shares_no_memory_with_the_environment():
     for array in observation.values():
         array[...] = 1e9
     repeated, _ = make("AirToWater").reset(seed=0)
-    for key, array in env._observation().items():
+    for key, array in env._core.observation_of(0).items():
         np.testing.assert_array_equal(array, before[key])
         np.testing.assert_array_equal(array, repeated[key])
 

@@ -69,8 +69,8 @@ def test_pictures_leave_the_flight_alone(interface):
         assert same(returned, drawn.step(action))
         if returned[2] or returned[3]:
             assert same(plain.reset(), drawn.reset())
-    assert plain._episodes.rows.tobytes() == drawn._episodes.rows.tobytes()
-    assert plain._episodes.closest.tobytes() == drawn._episodes.closest.tobytes()
+    assert plain._core.episodes.rows.tobytes() == drawn._core.episodes.rows.tobytes()
+    assert plain._core.episodes.closest.tobytes() == drawn._core.episodes.closest.tobytes()
 
 
 def test_detected_obstacles_are_drawn_dark():

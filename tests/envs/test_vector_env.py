@@ -1,6 +1,7 @@
 """The native vector environment: every row is the single environment, in Gymnasium's conventions."""
 
 import itertools
+import pickle
 
 import gymnasium as gym
 import numpy as np
@@ -101,6 +102,71 @@ def test_rows_are_single_environments_through_resets(count, threads, monkeypatch
     assert ended > 3
 
 
+@pytest.mark.parametrize("interface", ["world", "egocentric"])
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_threads_change_nothing(mode, interface, monkeypatch):
+    """Five threads, the last part of another length, against one: every array and object a step returns."""
+    monkeypatch.setattr(batch, "_ROWS_A_THREAD", 16)
+    one, many = (native(93, threads=k, autoreset_mode=mode, interface=interface, time_limit=20.0) for k in (1, 5))
+    assert [len(rows._core.simulations) for rows in (one, many)] == [1, 5]
+    (observation, _), other = one.reset(seed=6), many.reset(seed=6)
+    assert_same(observation, other[0])
+    walk, ended = Walk(2, one.single_action_space, interface), 0
+    for _ in range(60):
+        actions = walk(observation, 93)
+        returned = one.step(actions)
+        for part, twin in zip(returned, many.step(actions), strict=True):
+            assert_same(part, twin)
+        observation = returned[0]
+        ended += int((returned[2] | returned[3]).sum())
+    assert ended > 93
+
+
+@pytest.mark.parametrize("interface", ["world", "egocentric"])
+def test_copies_go_on_alike(interface, monkeypatch):
+    """What shares memory inside shares it in a copy too, threads included."""
+    monkeypatch.setattr(batch, "_ROWS_A_THREAD", 16)
+    rows = native(40, threads=2, interface=interface)
+    observation, _ = rows.reset(seed=1)
+    walk = Walk(4, rows.single_action_space, interface)
+    for _ in range(20):
+        observation = rows.step(walk(observation, 40))[0]
+    twin = pickle.loads(pickle.dumps(rows))
+    for _ in range(20):
+        actions = walk(observation, 40)
+        returned = rows.step(actions)
+        for part, other in zip(returned, twin.step(actions), strict=True):
+            assert_same(part, other)
+        observation = returned[0]
+
+
+def test_references_pass_through_a_filter():
+    rows, twin = native(4, time_limit=2.0), native(4, time_limit=2.0)
+    begun, told = [], []
+
+    def halfway(perceived, references, starting):
+        begun.append(starting)
+        told.append(perceived)
+        return 0.5 * (references + perceived.reference)
+
+    rows.filter_references(halfway)
+    observation, _ = rows.reset(seed=3)
+    twin.reset(seed=3)
+    for _ in range(7):
+        goal = np.column_stack([observation["goal"], np.zeros(4)]).astype(np.float32)
+        kept = {key: value.copy() for key, value in told[-1].observation().items()} if told else observation
+        assert_same(kept, observation)
+        expected = twin.step(0.5 * (goal.astype(np.float64) + observation["reference"]))
+        returned = rows.step(goal)
+        for part, other in zip(returned, expected, strict=True):
+            assert_same(part, other)
+        observation = returned[0]
+    np.testing.assert_array_equal([where.all() for where in begun], [k in (0, 5) for k in range(7)])
+    rows.filter_references(None)
+    assert_same(rows.step(goal)[0], twin.step(goal)[0])
+    assert len(begun) == 7
+
+
 def test_disabled_autoreset_and_masks():
     rows = native(4, autoreset_mode="Disabled", time_limit=1.0)
     observation, _ = rows.reset(seed=5)
@@ -180,7 +246,17 @@ def test_one_bad_row_harms_no_other():
         (lambda: native(0), ValueError, "num_envs must be a whole number of at least 1, got 0"),
         (lambda: native(2.5), ValueError, "num_envs must be a whole number of at least 1, got 2.5"),
         (lambda: native(2, threads=0), ValueError, "threads must be a whole number of at least 1, got 0"),
-        (lambda: native(2, no_such=1), TypeError, "no_such"),
+        (
+            lambda: native(100_000_000),
+            ValueError,
+            "num_envs must be at most 1000000: every row is stored whole, got 1000",
+        ),
+        (lambda: native(2, max_episode_steps=0), ValueError, "max_episode_steps must be a whole number of at least 1"),
+        (
+            lambda: native(2, no_such=1),
+            TypeError,
+            "unknown option 'no_such'; known are num_envs, mission, num_obst.*_steps$",
+        ),
         (lambda: native(2, autoreset_mode="never"), ValueError, "never"),
         (lambda: native(2).step(np.zeros((2, 4))), ResetNeeded, "called before reset"),
     ],

@@ -12,7 +12,7 @@ from tests.envs.missions import DIVE, SPHERE_BETWEEN, begin, wander
 def test_ticks_are_those_of_the_flight():
     env, _ = begin(DIVE, render_mode="rgb_array")
     flight = fly(env, StraightLine.for_env(env), scenario=DIVE)
-    track = env._screen.track(0)
+    track = env._core.screen.track(0)
     ticks = track.ticks(env.simulation)
     np.testing.assert_array_equal(ticks[:, :12], flight.trace.states)
     np.testing.assert_array_equal(ticks[:, 12:], flight.trace.references)
@@ -26,20 +26,20 @@ def test_ticks_can_be_asked_for_at_any_time():
     for _ in range(6):
         for each in (env, other):
             each.step(np.array([0.0, 0.0, 3.0, 0.0]))
-        lengths.append(len(env._screen.track(0).ticks(env.simulation)))
+        lengths.append(len(env._core.screen.track(0).ticks(env.simulation)))
     assert lengths == [11, 21, 31, 41, 51, 61]
-    often, once = (each._screen.track(0).ticks(each.simulation) for each in (env, other))
+    often, once = (each._core.screen.track(0).ticks(each.simulation) for each in (env, other))
     np.testing.assert_array_equal(often, once)
 
 
 def test_a_copy_goes_on_by_itself():
     env, _ = begin(DIVE, render_mode="rgb_array")
     wander(env, 2, 0)
-    copy = env._screen.track(0)
+    copy = env._core.screen.track(0)
     length = len(copy.ticks(env.simulation))
     wander(env, 2, 1)
     assert len(copy.ticks(env.simulation)) == length
-    assert len(env._screen.track(0).ticks(env.simulation)) > length
+    assert len(env._core.screen.track(0).ticks(env.simulation)) > length
 
 
 def test_earlier_moments_know_only_what_was_known():

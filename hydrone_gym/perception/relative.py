@@ -1,17 +1,13 @@
 """Relative actions: the mission frame, and references as offsets from the vehicle in it.
 
-Why as it is, and the frame: `hydrone_gym.envs.egocentric`.
+Why as it is, and the frame: `hydrone_gym.perception.egocentric`.
 """
 
-from typing import NamedTuple
-
 import numpy as np
-from gymnasium import spaces
-from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym.envs.task import pack_task
-from hydrone_gym.simulation.time_to_go import CruiseSpeeds
+from hydrone_gym.control.laws import envelope_of
+from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds
 from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
@@ -20,36 +16,15 @@ STEP = (2.0, 2.0, 1.5)  # m along x', y', z at full action: 3.2 m at most, about
 MARGIN = 0.2  # m: the nearest a reference comes to the box
 
 
-def relative_action_space() -> spaces.Box:
-    """Offsets in the mission frame, (3,) float32 in [-1, 1]."""
-    return spaces.Box(-1.0, 1.0, (3,), np.float32)
+_SPEEDS = np.dtype([(name, np.float64) for name in CruiseSpeeds._fields])
+_BOX = ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max", "zone", "radius")  # m
+EGOCENTRIC = np.dtype([*((name, np.float64) for name in _BOX), ("speeds", _SPEEDS)])
 
 
-class EgocentricParams(NamedTuple):
-    """The constants of the interface: m, m/s."""
-
-    x_min: float
-    y_min: float
-    z_min: float
-    x_max: float
-    y_max: float
-    z_max: float
-    zone: float
-    radius: float
-    speeds: CruiseSpeeds
-
-
-def pack_egocentric(vehicle: Vehicle, world: World) -> NDArray[np.float64]:
-    """Flatten the constants to one array, which reaches a kernel fastest."""
-    speeds = pack_task(vehicle, world, 0.0)[-len(CruiseSpeeds._fields) :]
-    return np.array([*world.lower, *world.upper, world.zone, vehicle.radius, *speeds])
-
-
-@inlined
-def unpack_egocentric(v):
-    """Rebuild the `EgocentricParams` of a packed array inside a kernel."""
-    speeds = CruiseSpeeds(v[8], v[9], v[10], v[11], v[12])
-    return EgocentricParams(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], speeds)
+def pack_egocentric(vehicle: Vehicle, world: World) -> np.ndarray:
+    """Return the constants of the interface as one record (1,), dtype `EGOCENTRIC`."""
+    speeds = tuple(cruise_speeds(envelope_of(vehicle)))
+    return np.array([(*world.lower, *world.upper, world.zone, vehicle.radius, speeds)], EGOCENTRIC)
 
 
 @inlined
@@ -75,24 +50,24 @@ def _unit(value):
 
 
 @kernel
-def place_references(rows, actions, starts, values, first, last, out):
-    """Turn relative actions of rows [first, last) into references.
+def place_references(told, actions, memory, values, out):
+    """Turn relative actions into references.
 
     Args:
-        rows: (n,) dtype `ROW`.
+        told: (n,) as in `Perceived`.
         actions: (n, 3) float32 offsets in the mission frame, clipped to [-1, 1].
-        starts: (n, 3) where the episodes started, m.
+        memory: (n, 3 or more) where the episodes started, x, y, z in m.
         values: from `pack_egocentric`.
-        first, last: which rows.
         out: (n, 4) float64 m, m, m, rad, written; every number is a float32.
     """
-    p = unpack_egocentric(values)
-    for n in range(first, last):
-        s, goal = rows[n].state, rows[n].goal
-        cosine, sine = mission_frame(starts[n, 0], starts[n, 1], goal[0], goal[1])
+    p = values[0]
+    for n in range(out.shape[0]):
+        row = told[n]
+        s, goal = row.state, row.goal
+        cosine, sine = mission_frame(memory[n, 0], memory[n, 1], goal[0], goal[1])
         ahead = STEP[0] * _unit(np.float64(actions[n, 0]))
         left = STEP[1] * _unit(np.float64(actions[n, 1]))
         out[n, 0] = _inside(s[0] + (cosine * ahead - sine * left), p.x_min, p.x_max)
         out[n, 1] = _inside(s[1] + (sine * ahead + cosine * left), p.y_min, p.y_max)
         out[n, 2] = _inside(s[2] + STEP[2] * _unit(np.float64(actions[n, 2])), p.z_min, p.z_max)
-        out[n, 3] = np.float64(np.float32(rows[n].reference[3] if is_air(s[2]) else s[5]))
+        out[n, 3] = np.float64(np.float32(row.reference[3] if is_air(s[2]) else s[5]))

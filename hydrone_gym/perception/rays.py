@@ -41,13 +41,14 @@ RAY_NAMES = (
 
 
 @inlined
-def leave_box(x, y, z, dx, dy, dz, box):
-    """Distance (m) from a position along a unit vector to the box; negative if it lies behind.
+def leave_box(place, way, box):
+    """Distance (m) from a position along a unit vector (x, y, z) to the box; negative if it lies behind.
 
     Slabs: of the two crossings of each axis the later one leaves. A component of zero gives infinity, or on a wall
     NaN, which no comparison takes.
     """
-    inverse_x, inverse_y, inverse_z = 1.0 / dx, 1.0 / dy, 1.0 / dz
+    x, y, z = place
+    inverse_x, inverse_y, inverse_z = 1.0 / way[0], 1.0 / way[1], 1.0 / way[2]
     low, high = (box.x_min - x) * inverse_x, (box.x_max - x) * inverse_x
     distance = low if low > high else high
     low, high = (box.y_min - y) * inverse_y, (box.y_max - y) * inverse_y
@@ -67,45 +68,43 @@ def share_of_reach(distance):
 
 
 @inlined
-def cast_fixed(out, n, first, state, cosine, sine, known, found, box, radius):
-    """Write the fixed rays of row n, as shares of the reach, to out[n, first : first + FIXED].
+def cast_fixed(out, first, place, frame, spheres, count, params):
+    """Write the fixed rays of a row, as shares of the reach, to out[first : first + FIXED].
 
     Args:
-        out: (rows, K) float32; its own columns hold the least so far, since rounding keeps the order.
-        n: row of `out`, `known` and `found`.
+        out: (K,) float32; its own columns hold the least so far, since rounding keeps the order.
         first: column of the first ray.
-        state: (12,), position first (m).
-        cosine, sine: of the mission frame's azimuth.
-        known, found: (rows, M, 4) spheres x, y, z, r in m, and how many of them count.
-        box: has x_min ... z_max (m).
-        radius: of the vehicle (m).
+        place: (x, y, z), m.
+        frame: cosine and sine of the mission frame's azimuth.
+        spheres, count: (M, 4) x, y, z, r in m, and how many of them count.
+        params: has the box, x_min ... z_max, and the vehicle's radius (m).
     """
-    x, y, z = state[0], state[1], state[2]
+    cosine, sine = frame
     for k in range(FIXED):
         dx, dy = cosine * _X[k] - sine * _Y[k], sine * _X[k] + cosine * _Y[k]
-        out[n, first + k] = share_of_reach(leave_box(x, y, z, dx, dy, _Z[k], box))
-    for j in range(found[n]):
-        ox, oy, oz = known[n, j, 0] - x, known[n, j, 1] - y, known[n, j, 2] - z
-        inflated = known[n, j, 3] + radius
+        out[first + k] = share_of_reach(leave_box(place, (dx, dy, _Z[k]), params))
+    for j in range(count):
+        ox, oy, oz = spheres[j, 0] - place[0], spheres[j, 1] - place[1], spheres[j, 2] - place[2]
+        inflated = spheres[j, 3] + params.radius
         square = ox * ox + oy * oy + oz * oz
         if square < (REACH + inflated) * (REACH + inflated):
             power = square - inflated * inflated
             ahead, left = cosine * ox + sine * oy, cosine * oy - sine * ox
             for k in range(FIXED):
                 share = share_of_reach(meet_ray(ahead * _X[k] + left * _Y[k] + oz * _Z[k], power))
-                out[n, first + k] = min(out[n, first + k], np.float32(share))
+                out[first + k] = min(out[first + k], np.float32(share))
 
 
 @routine
-def cast_along(n, state, vx, vy, vz, known, found, box, radius):
+def cast_along(place, vector, spheres, count, params):
     """Share of the reach that is free along a vector (any length, world frame); 1 if it is shorter than `STILL`."""
+    vx, vy, vz = vector
     length = np.sqrt(vx * vx + vy * vy + vz * vz)
-    x, y, z = state[0], state[1], state[2]
     dx, dy, dz = vx / length, vy / length, vz / length
-    least = leave_box(x, y, z, dx, dy, dz, box)
-    for j in range(found[n]):
-        ox, oy, oz = known[n, j, 0] - x, known[n, j, 1] - y, known[n, j, 2] - z
-        inflated = known[n, j, 3] + radius
+    least = leave_box(place, (dx, dy, dz), params)
+    for j in range(count):
+        ox, oy, oz = spheres[j, 0] - place[0], spheres[j, 1] - place[1], spheres[j, 2] - place[2]
+        inflated = spheres[j, 3] + params.radius
         power = ox * ox + oy * oy + oz * oz - inflated * inflated
         t = meet_ray(ox * dx + oy * dy + oz * dz, power)
         least = t if t < least else least
