@@ -15,6 +15,7 @@ import functools
 import hashlib
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -26,31 +27,35 @@ from numba.core import sigutils
 from numba.core.ccallback import CFunc
 
 _ROOT = Path(__file__).resolve().parent.parent
-_IMPORT = re.compile(r"^\s*from ((?:hydrone_gym|planners|agents)[\w.]*) import", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*from ((?:hydrone_gym|planners|agents)[\w.]*) import (.*)$", re.MULTILINE)
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False}
 
 
 def _source(module: str) -> Path | None:
-    """File of a module of this project, None if there is none."""
+    """File of a module of this project, or of another one that is loaded; None if there is none."""
     path = _ROOT.joinpath(*module.split("."))
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):
         if candidate.is_file():
             return candidate
-    return None
+    elsewhere = getattr(sys.modules.get(module), "__file__", None)
+    return Path(elsewhere) if elsewhere else None
 
 
 @functools.cache
 def _imported(module: str) -> frozenset[str]:
-    """The project's modules that a module imports by name."""
-    path = _source(module)
-    return frozenset() if path is None else frozenset(_IMPORT.findall(path.read_text(encoding="utf-8")))
+    """The project's modules that a module imports from, or by name."""
+    path, found = _source(module), set()
+    for origin, names in [] if path is None else _IMPORT.findall(path.read_text(encoding="utf-8")):
+        found.add(origin)
+        found |= {inner for name in re.findall(r"\w+", names) if _source(inner := f"{origin}.{name}")}
+    return frozenset(found)
 
 
 @functools.cache
-def _fingerprint(module: str) -> str:
-    """Hash of the compiler, NumPy, and the source of a module and of all it imports, however deep."""
+def _fingerprint(*modules: str) -> str:
+    """Hash of the compiler, NumPy, and the source of modules and of all they import, however deep."""
     seen: set[str] = set()
-    waiting = {module}
+    waiting = set(modules)
     while waiting:
         seen |= waiting
         waiting = {name for found in waiting for name in _imported(found)} - seen
@@ -76,12 +81,12 @@ def cache_root() -> Path | None:
     return None
 
 
-def _cached(compiled: Any, module: str) -> Any:
-    """Let a compiled function keep its machine code on disk, under the fingerprint of a module."""
+def _cached(compiled: Any, *modules: str) -> Any:
+    """Let a compiled function keep its machine code on disk, under the fingerprint of modules."""
     root = cache_root()
     if root is not None:
         before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(root / _fingerprint(module))
+        numba.config.CACHE_DIR = str(root / _fingerprint(*modules))
         try:
             compiled.enable_caching()
         finally:
@@ -94,7 +99,7 @@ def kernel(function: Callable) -> Any:
     return _cached(numba.njit(**_OPTIONS)(function), function.__module__)
 
 
-def unit(signature: Any, function: Callable, module: str) -> Any:
+def unit(signature: Any, function: Callable, *modules: str) -> Any:
     """Compile a function that other kernels call by its `address`, see `hydrone_gym._memory.call`; cached on disk.
 
     Its callers do not contain it: they compile without it, and are the same for every variant of it.
@@ -102,10 +107,10 @@ def unit(signature: Any, function: Callable, module: str) -> Any:
     Args:
         signature: Numba types; pointers and numbers only.
         function: what it closes over must be plain data or classes, which do not change from process to process.
-        module: under whose fingerprint it is cached, one that imports everything the function uses.
+        modules: under whose fingerprint it is cached; they import everything that the function uses.
     """
     unit = CFunc(function, sigutils.normalize_signature(signature), {}, _OPTIONS)
-    _cached(unit, module).compile()
+    _cached(unit, *modules).compile()
     return unit
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from hydrone_gym import _jit
 
-CODE = "import hydrone_gym._jit as jit; print(jit._fingerprint('hydrone_gym.simulation.rows'))"
+CODE = "import hydrone_gym._jit as jit; print(jit._fingerprint('hydrone_gym.simulation.advance'))"
 
 
 def fingerprint_in(root):
@@ -31,6 +31,14 @@ def test_editing_an_inlined_function_elsewhere_changes_the_cache(copy):
     assert before == fingerprint_in(copy)
     path = copy / "hydrone_gym" / "physics" / "dynamics.py"
     path.write_text(path.read_text().replace("2.0 * rate", "2.1 * rate"))
+    assert fingerprint_in(copy) != before
+
+
+def test_editing_a_module_that_is_imported_whole_changes_the_cache(copy):
+    """`from hydrone_gym.control import paper` names a module, not something in one."""
+    before = fingerprint_in(copy)
+    path = copy / "hydrone_gym" / "control" / "paper.py"
+    path.write_text(path.read_text() + "\n# a remark\n")
     assert fingerprint_in(copy) != before
 
 

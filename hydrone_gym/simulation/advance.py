@@ -13,8 +13,8 @@ from numba import types
 
 from hydrone_gym._jit import inlined, unit
 from hydrone_gym._memory import gather, scatter, select
-from hydrone_gym.control import laws
 from hydrone_gym.control.law import control
+from hydrone_gym.control.laws import named_law
 from hydrone_gym.control.reference import Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
@@ -242,11 +242,11 @@ def compiled(law: str, lanes: int) -> Any:
 
     Called as ``call(address, block, obstacles, closest, values, count, first, last, ticks)``.
     """
-    gains = laws.named_law(law).gains
+    gains = named_law(law).gains
 
     def unit_of_law(block, obstacles, closest, values, count, first, last, ticks):
         advance(block, lanes, obstacles, closest, count, model_of(values, gains), first, last, ticks)
 
     numbers, whole = types.CPointer(types.float64), types.int64
     signature = types.void(numbers, numbers, numbers, numbers, whole, whole, whole, whole)
-    return unit(signature, unit_of_law, __name__)
+    return unit(signature, unit_of_law, __name__, gains.__module__)

@@ -89,7 +89,7 @@ def test_no_belief_is_the_simulation_of_the_environment():
 
 def test_bad_beliefs():
     env = gym.make("HydroneGym/AirToWater-v0")
-    with pytest.raises(TypeError, match='belief must be a planners.belief.Belief, "truth" or None, got 3'):
+    with pytest.raises(TypeError, match=r'belief must be a planners\.belief\.Belief, "truth" or None, got 3'):
         CLRRT.for_env(env, belief=3)
     with pytest.raises(TypeError, match="for_env needs a HyDrone environment"):
         Shield.for_env(None, object())
