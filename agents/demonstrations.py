@@ -45,7 +45,7 @@ import hydrone_gym
 from agents.evaluation import HELD_OUT, MISSIONS
 from hydrone_gym.evaluation import provenance
 from hydrone_gym.evaluation.policies import PolicySource, find_policy
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.simulation.outcome import Outcome
 
 FIRST_SEED = 6_000_000  # above the worlds that training draws, below those held out

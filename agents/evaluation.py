@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import hydrone_gym  # noqa: F401  (registers the ids)
 from agents.agent import load_agent, shipped_agents
 from hydrone_gym.evaluation.policies import find_policy, known_policies
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
 from planners.shield import Shield

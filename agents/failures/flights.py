@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym.envs.egocentric import RawObservation
 from hydrone_gym.evaluation.flight import Flight, fly
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.simulation.outcome import Outcome
 from planners.shield import HELD, Shield
 

@@ -29,7 +29,7 @@ from agents.failures.figures import draw_how, draw_where, draw_worlds
 from agents.failures.flights import fly_again
 from agents.failures.tables import failure_tables, write_failures
 from agents.failures.worlds import features_of
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.rendering.style import DOTS_PER_INCH
 from hydrone_gym.simulation.outcome import Outcome
 

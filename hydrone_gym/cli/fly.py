@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from hydrone_gym.cli.missions import Mission, MissionOptions
+from hydrone_gym.cli.missions import MissionOptions, Prepared
 from hydrone_gym.evaluation.flight import Flight, fly
-from hydrone_gym.evaluation.report import draw_flight, flight_record
-from hydrone_gym.evaluation.saved import FORMAT, VERSION
-from planners import CLRRT
+from hydrone_gym.evaluation.flight_figures import draw_flight
+from hydrone_gym.evaluation.saved import FORMAT, VERSION, flight_record
 
 _TREE_ITERATIONS = 400  # samples of the tree figure
 
@@ -34,12 +32,8 @@ class Fly(MissionOptions):
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
-        try:
-            missions = self.missions()
-            self.out.mkdir(parents=True, exist_ok=True)
-        except (ValueError, OSError) as error:
-            print(f"hydrone: error: {error}", file=sys.stderr)
-            return 2
+        missions = self.prepare()
+        self.out.mkdir(parents=True, exist_ok=True)
         records = []
         with _progress(len(missions) * (1 if self.no_figures else 3)) as step:
             for mission in missions:
@@ -52,7 +46,7 @@ class Fly(MissionOptions):
         self._report(records)
         return 0 if all(record["success"] for record in records) else 1
 
-    def _draw(self, mission: Mission, flight: Flight, step: Callable[[str], None]) -> list[Path]:
+    def _draw(self, mission: Prepared, flight: Flight, step: Callable[[str], None]) -> list[Path]:
         """Write the figures of one mission; return their paths."""
         step(f"{mission.name}: drawing the flight")
         files = draw_flight(flight, mission.env.get_wrapper_attr("simulation"), self.out, mission.name)
@@ -90,14 +84,15 @@ def _progress(steps: int) -> Iterator[Callable[[str], None]]:
         yield step
 
 
-def _draw_tree(mission: Mission, folder: Path) -> list[Path]:
-    """Draw the tree that the CL-RRT grows from the start when every obstacle is known (paper, Fig. 5)."""
-    if not isinstance(mission.policy, CLRRT):
+def _draw_tree(mission: Prepared, folder: Path) -> list[Path]:
+    """Draw the tree that a planner with `grow_tree` grows from the start, every obstacle known (paper, Fig. 5)."""
+    grow_tree = getattr(mission.policy, "grow_tree", None)
+    if grow_tree is None:
         return []
     from hydrone_gym.rendering.figures import plot_tree, save_figure
 
     everything = {**mission.observation, "obstacles": mission.scenario.obstacles}
-    tree = mission.policy.grow_tree(everything, _TREE_ITERATIONS)
+    tree = grow_tree(everything, _TREE_ITERATIONS)
     path = tree.edges[tree.path]
     solution = np.concatenate((path[:1, 0], path[:, 1])) if len(path) else None
     world = mission.env.get_wrapper_attr("world")

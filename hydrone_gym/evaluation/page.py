@@ -13,20 +13,10 @@ from pathlib import Path
 from urllib.parse import quote
 
 from hydrone_gym.evaluation.page_figures import SEVERAL, Chart, charts_of, groups_of
-from hydrone_gym.evaluation.plan import Plan
+from hydrone_gym.evaluation.plan import Plan, plan_of
 from hydrone_gym.evaluation.records import Record
-from hydrone_gym.evaluation.replays import (
-    REPLAYS,
-    Shown,
-    Writer,
-    place_of,
-    plan_of,
-    same_flight,
-    shown_flights,
-    write_replays,
-)
-from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, write_whole
-from hydrone_gym.evaluation.stored import Stored, read_stored
+from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
+from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary
 from hydrone_gym.evaluation.tables import Table
 
@@ -211,11 +201,11 @@ def _replays(stored: Stored, shown: Sequence[Shown], flown: Flown, folder: Path)
 def _flight(record: Record, flown: tuple[Path, Record] | None, folder: Path) -> str:
     """Return a cell: how a flight ended, linked to its replay, and where it was."""
     ending = escape(_ending(record))
-    place = f"<br><small>{escape(place_of(record))}</small>"
+    place = f"<br><small>{escape(record.place)}</small>"
     if flown is None:
         return ending + place
     path, again = flown
-    differs = "" if same_flight(record, again) else f"<br><small>flown again: {escape(_ending(again))}</small>"
+    differs = "" if record.same_flight(again) else f"<br><small>flown again: {escape(_ending(again))}</small>"
     return _link(path.relative_to(folder).as_posix(), _ending(record)) + place + differs
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class PolicySummary:
         success: share that arrived, with the 95 % Wilson interval.
         collisions, rough_crossings, timeouts, out_of_bounds, diverged: flights that ended so.
         time, length, energy: s, m and J of the flights that arrived: interquartile mean and 95 % bootstrap interval;
-            None if none did.
+            None if none did, and for the length of flights in batches.
         clearance: least distance to an obstacle over all flights, m; None without obstacles.
         lateral_speed, tilt: largest at a crossing over all flights, m/s and rad; None without crossings.
         interventions: of the shield, mean a flight; None without a shield.
@@ -124,6 +125,31 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
     return summaries
 
 
+def scores_of(records: Sequence[Record]) -> list[dict[str, Any]]:
+    """Return how the flights of each mission ended, in short: plain data, with means in s and J of those that arrived.
+
+    Args:
+        records: of one policy.
+    """
+    scores = []
+    for mission in dict.fromkeys(record.mission for record in records):
+        flown = [record for record in records if record.mission == mission]
+        arrived = [record for record in flown if record.success]
+        ends = [record.outcome for record in flown]
+        scores.append(
+            {
+                "mission": mission,
+                "episodes": len(flown),
+                "outcomes": {kind.name: ends.count(kind.name) for kind in Outcome if kind.name in ends},
+                "success": len(arrived) / len(flown),
+                "interval": wilson_interval(len(arrived), len(flown)),
+                "time": float(np.mean([record.time for record in arrived])) if arrived else None,
+                "energy": float(np.mean([record.energy for record in arrived])) if arrived else None,
+            }
+        )
+    return scores
+
+
 def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str) -> MissionSummary:
     flown = {name: [r for r in records if r.policy == name] for name in dict.fromkeys(r.policy for r in records)}
     ranked = sorted(flown, key=lambda name: _order(flown[name]))
@@ -164,7 +190,7 @@ def _policy(name: str, rank: int, records: Sequence[Record]) -> PolicySummary:
         out_of_bounds=outcomes.count(Outcome.OUT_OF_BOUNDS.name),
         diverged=outcomes.count(Outcome.DIVERGED.name),
         time=_estimate([record.time for record in arrived]),
-        length=_estimate([record.length for record in arrived]),
+        length=_estimate([record.length for record in arrived if record.length is not None]),
         energy=_estimate([record.energy for record in arrived]),
         clearance=min((r.clearance for r in records if r.clearance is not None), default=None),
         lateral_speed=max((r.lateral_speed for r in records if r.lateral_speed is not None), default=None),

@@ -1,18 +1,14 @@
 """The flights that show a policy, its best, its median and its worst one: which they are, and flying them again."""
 
-import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from hydrone_gym.evaluation.flight import Flight, fly
-from hydrone_gym.evaluation.jobs import make_env
 from hydrone_gym.evaluation.plan import Plan
-from hydrone_gym.evaluation.policies import PolicySource
-from hydrone_gym.evaluation.records import COLUMNS, TIMING, Record, record_of
-from hydrone_gym.evaluation.suites import load_suite
+from hydrone_gym.evaluation.records import Record, record_of
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import Simulation
 
@@ -69,25 +65,6 @@ def _badness(record: Record) -> tuple[int, float]:
     return _RANK[record.outcome], record.time if record.success else -record.time
 
 
-def plan_of(arguments: Mapping[str, Any]) -> Plan:
-    """Find again what an evaluation flew, from the arguments in its summary.
-
-    Raises:
-        ValueError: a suite that is not what it was; FileNotFoundError: one that is not frozen and has no file here.
-    """
-    suites = []
-    for name, fingerprint in arguments["suites"].items():
-        suite = load_suite(name).first(max(arguments["worlds"][name].values()))
-        if suite.fingerprint() != fingerprint:
-            raise ValueError(f"suite {name}: its worlds are not those that were flown; give the plan of the evaluation")
-        suites.append(suite)
-    policies = []
-    for label, origin in arguments["policies"].items():
-        factory, _, folder = origin.partition(" ")
-        policies.append(PolicySource(label=label, factory=factory, search=os.getcwd(), folder=folder))
-    return Plan(suites=tuple(suites), policies=tuple(policies), seed=arguments["seed"], vehicle=arguments["vehicle"])
-
-
 def write_replays(shown: Sequence[Shown], plan: Plan, folder: Path, write: Writer) -> dict[Record, tuple[Path, Record]]:
     """Fly the flights again and write a replay of each into a folder, which is made if missing.
 
@@ -111,30 +88,16 @@ def write_replays(shown: Sequence[Shown], plan: Plan, folder: Path, write: Write
         for name, record in (("best", entry.best), ("median", entry.median), ("worst", entry.worst)):
             if record in written:
                 continue
-            flight, simulation = fly_again(record, plan)
+            flight, simulation = fly_record(record, plan)
             path = folder / f"{number}-{re.sub('[^a-zA-Z0-9.-]+', '_', entry.policy)[-60:]}-{name}.html"
-            write(flight, simulation, path, title=f"{entry.policy}, {name} flight: {place_of(record)}")
+            write(flight, simulation, path, title=f"{entry.policy}, {name} flight: {record.place}")
             written[record] = (path, record_of(record.key, flight))
     return written
 
 
-def fly_again(record: Record, plan: Plan) -> tuple[Flight, Simulation]:
-    """Fly what a record tells of; errors as for `write_replays`."""
-    missions = {(suite.name, m.name): m for suite in plan.suites for m in suite.missions}
-    mission = missions.get((record.suite, record.mission))
-    sources = [policy for policy in plan.policies if policy.label == record.policy]
-    if mission is None or record.world >= len(mission.scenarios) or not sources:
-        raise ValueError(f"the plan does not hold {place_of(record)}, policy {record.policy}")
-    env = make_env(mission.env_id, {**mission.options, "vehicle": plan.vehicle})
-    flight = fly(env, sources[0].make(env, plan.seed), scenario=mission.scenarios[record.world])
+def fly_record(record: Record, plan: Plan) -> tuple[Flight, Simulation]:
+    """Fly what a record tells of, alone; errors as for `write_replays`."""
+    job = plan.job_of(record)
+    env = job.make_env()
+    flight = fly(env, job.policy.make(env, job.seed), scenario=job.worlds[0][1])
     return flight, env.get_wrapper_attr("simulation")
-
-
-def place_of(record: Record) -> str:
-    """Name the world of a record."""
-    return f"{record.suite}, {record.mission}, world {record.world}"
-
-
-def same_flight(one: Record, other: Record) -> bool:
-    """Tell whether two records differ in nothing but times of decisions."""
-    return all(getattr(one, name) == getattr(other, name) for name in COLUMNS if name not in TIMING)
