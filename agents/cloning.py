@@ -7,7 +7,6 @@ lead where nobody has flown, is that of this module too.
 """
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -20,13 +19,13 @@ from tqdm import tqdm
 
 from agents.agent import ACTIONS
 from agents.agent_file import TEXT, AgentFile, save_agent
+from agents.algorithms import network_of
 from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Demonstration, Demonstrations
-from agents.evaluation import MISSIONS
-from agents.network import Network
 from hydrone_gym.envs.egocentric import OBSERVATION_SIZE, Egocentric
 from hydrone_gym.envs.relative import STEP
 from hydrone_gym.evaluation import provenance
+from hydrone_gym.evaluation.suites import MISSIONS
 from hydrone_gym.simulation.outcome import Outcome
 
 REPORT = "cloning.json"
@@ -178,7 +177,7 @@ def clone(cloning: Cloning) -> Cloned:
     if held_back:
         kept = pairs_of(held_back, egocentric)
         clipped, count = clipped + kept.clipped, count + len(kept.actions)
-        loss = float(np.mean((_network_of(layers)(kept.observations) - kept.actions) ** 2))
+        loss = float(np.mean((network_of(list(layers))(kept.observations) - kept.actions) ** 2))
     cloned = Cloned(
         agent=_agent_of(layers, datasets, cloning),
         options=options,
@@ -239,17 +238,6 @@ def _layers(hidden: tuple[int, ...]) -> torch.nn.Sequential:
     return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], ACTIONS))
 
 
-def _arrays(layers: torch.nn.Sequential, name: str) -> Iterator[NDArray[np.float32]]:
-    for layer in layers:
-        if isinstance(layer, torch.nn.Linear):
-            yield np.ascontiguousarray(getattr(layer, name).detach().numpy().T)
-
-
-def _network_of(layers: torch.nn.Sequential) -> Network:
-    weights, biases = tuple(_arrays(layers, "weight")), tuple(_arrays(layers, "bias"))
-    return Network(weights=weights, biases=biases, activation="relu", output="linear")
-
-
 def _agent_of(layers: torch.nn.Sequential, datasets: list[Demonstrations], cloning: Cloning) -> AgentFile:
     """Return the agent with what it was learnt from."""
     sources = [{"env_id": each.env_id, "policy": each.policy, "sha256": each.sha256} for each in datasets]
@@ -258,7 +246,7 @@ def _agent_of(layers: torch.nn.Sequential, datasets: list[Demonstrations], cloni
         name=cloning.out.name,
         algorithm="behaviour cloning",
         environment=MISSIONS[0],
-        network=_network_of(layers),
+        network=network_of(list(layers)),
         notes={
             **settings,
             "learning_rate": cloning.learning_rate,

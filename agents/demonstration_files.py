@@ -8,11 +8,10 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.envs.registration import registry
 from minari.dataset.minari_storage import MinariStorage
 
-from agents.demonstrations import DATA, FORMAT, INFOS, METADATA, OWN, SHA, Demonstration, Demonstrations, type_of_info
+from agents.demonstrations import DATA, FORMAT, INFOS, METADATA, OWN, SHA, Demonstration, Demonstrations
 
 _KEYS = ("env_id", "options", "policy", "versions")
 
@@ -72,32 +71,22 @@ def _read(data: Path) -> Demonstrations:
 def _flight(episode: dict[str, Any], seed: int, env: gym.Env) -> Demonstration:
     """Check one flight against the spaces of its environment; ValueError says what does not fit."""
     name, periods = f"episode {episode['id']}", len(episode["rewards"])
-    space, actions = env.observation_space, env.action_space
-    assert isinstance(space, spaces.Dict)
-    assert isinstance(actions, spaces.Box)
-    for key, box in space.items():
-        _check(
-            f"{name}: observations[{key!r}]",
-            episode["observations"].get(key),
-            (periods + 1, *(box.shape or ())),
-            box.dtype,
-        )
-    _check(f"{name}: actions", episode["actions"], (periods, *actions.shape), actions.dtype)
-    _check(f"{name}: rewards", episode["rewards"], (periods,), np.dtype(np.float64))
-    infos = episode["infos"] or {}
-    for key in INFOS:
-        _check(f"{name}: infos[{key!r}]", infos.get(key), (periods + 1,), np.dtype(type_of_info(key)))
-    for key in ("terminations", "truncations"):
-        _check(f"{name}: {key}", episode[key], (periods,), np.dtype(bool))
+    boxes: Any = env.observation_space
+    wanted = {f"observations[{key!r}]": (periods + 1, *box.shape, box.dtype) for key, box in boxes.items()}
+    wanted |= {f"infos[{key!r}]": (periods + 1, np.dtype(kind)) for key, kind in INFOS.items()}
+    wanted |= {"actions": (periods, *(env.action_space.shape or ()), env.action_space.dtype)}
+    wanted |= {"rewards": (periods, np.dtype(np.float64))}
+    wanted |= {key: (periods, np.dtype(bool)) for key in ("terminations", "truncations")}
+    found = {f"observations[{key!r}]": array for key, array in episode["observations"].items()}
+    found |= {f"infos[{key!r}]": array for key, array in (episode["infos"] or {}).items()}
+    for key, (*shape, dtype) in wanted.items():
+        array = found.get(key, episode.get(key))
+        if not isinstance(array, np.ndarray) or (array.shape, array.dtype) != (tuple(shape), dtype):
+            got = f"{array.shape} {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
+            raise ValueError(f"{name}: {key} must be {tuple(shape)} {dtype}, got {got}")
+        if key in ("actions", "rewards") and not np.isfinite(array).all():
+            raise ValueError(f"{name}: {key} must be finite")
     over = episode["terminations"] | episode["truncations"]
     if periods == 0 or over.sum() != 1 or not over[-1]:
         raise ValueError(f"{name}: it must end once, with its last period")
     return Demonstration(seed=seed, **{key: value for key, value in episode.items() if key != "id"})
-
-
-def _check(name: str, array: Any, shape: tuple[int, ...], dtype: Any) -> None:
-    if not isinstance(array, np.ndarray) or array.shape != shape or array.dtype != dtype:
-        got = f"{array.shape} {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
-        raise ValueError(f"{name} must be {shape} {dtype}, got {got}")
-    if name.endswith(("actions", "rewards")) and not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite")

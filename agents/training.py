@@ -16,17 +16,19 @@ import yaml
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.agent_file import save_agent
-from agents.algorithms import ALGORITHMS
+from agents.algorithms import ALGORITHMS, export_agent
 from agents.checkpoint import MODEL, checkpoints, load_checkpoint
-from agents.evaluation import HELD_OUT, Score, evaluate_missions
-from agents.export import export_agent
 from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, Recipe, load_recipe
 from agents.run_log import CHECKPOINTS, RunLog, draw_curve
 from hydrone_gym.evaluation.provenance import versions
+from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.run import evaluate_held_out
+from hydrone_gym.evaluation.suites import HELD_OUT
 
 CONFIG = "config.yaml"
 TENSORBOARD = "tensorboard"
+Flown = tuple[list[Record], list[dict[str, Any]]]  # of held-out worlds: records, and their scores
 PACKAGES = ("hydrone-gym", "stable_baselines3", "sb3_contrib", "torch", "gymnasium", "numpy", "numba")
 
 
@@ -84,8 +86,8 @@ class TrainingRun:
         return recipe if self.steps is None else dataclasses.replace(recipe, steps=self.steps)
 
 
-def train(run: TrainingRun) -> list[Score]:
-    """Train from the beginning and return the scores on held-out worlds.
+def train(run: TrainingRun) -> Flown:
+    """Train from the beginning and return how the agent flew in held-out worlds.
 
     Raises:
         FileExistsError: the folder holds a run already; go on with it by `resume`.
@@ -106,8 +108,8 @@ def train(run: TrainingRun) -> list[Score]:
     return _learn(run, recipe, model, (0.0, 0.0))
 
 
-def resume(folder: Path, *, progress: bool = True) -> list[Score]:
-    """Go on with a run from its latest checkpoint, as if it had not stopped, and return its scores.
+def resume(folder: Path, *, progress: bool = True) -> Flown:
+    """Go on with a run from its latest checkpoint, as if it had not stopped, and return what `train` does.
 
     Raises:
         FileNotFoundError: no run, or one without a checkpoint.
@@ -137,7 +139,7 @@ def _latest(folder: Path) -> Path:
     return saved[-1]
 
 
-def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[float, float]) -> list[Score]:
+def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[float, float]) -> Flown:
     """Train to the end, then write the curve's figure, the agent and its evaluation."""
     log = RunLog(run.folder, recipe.steps, every=run.checkpoint_every, progress=run.progress, spent=spent)
     model.tensorboard_log = str(run.folder / TENSORBOARD) if run.tensorboard else None
@@ -149,12 +151,12 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
     folder, episodes = run.folder / "agent", run.evaluation_episodes
     notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions(PACKAGES)}
     save_agent(export_agent(model, run.folder.name, ENV_ID, notes), folder)
-    scores = []
+    flown: Flown = ([], [])
     if episodes > 0:
-        scores = evaluate_missions(folder, shield=recipe.shield, episodes=episodes, options=run.options)
-    text = json.dumps([dataclasses.asdict(score) for score in scores], indent=1)
-    (run.folder / "evaluation.json").write_text(text + "\n", encoding="utf-8")
-    return scores
+        policy = f"{folder}+shield" if recipe.shield else str(folder)
+        flown = evaluate_held_out(policy, worlds=episodes, options=run.options)
+    (run.folder / "evaluation.json").write_text(json.dumps(flown[1], indent=1) + "\n", encoding="utf-8")
+    return flown
 
 
 def _write_config(run: TrainingRun, recipe: Recipe) -> None:

@@ -30,18 +30,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name)}
     if not given or given[0] not in commands:
         return _help(commands, given)
-    extra = ""
     try:
         kind = commands[given[0]].load()
-        extra = getattr(kind, "EXTRA", "")
+    except Exception as error:  # of somebody else's package
+        return refused(f"{given[0]} cannot be loaded: {type(error).__name__}: {error}")
+    try:
         code = _parsed(kind, given).run()
         sys.stdout.flush()
     except BrokenPipeError:  # the reader, `head` say, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except ImportError as error:
-        needed = f'; this needs: pip install "hydrone-gym[{extra}]"' if extra else ""
-        return refused(f"{error}{needed}")
+        extra = getattr(kind, "EXTRA", "")
+        return refused(f'{error}; this needs: pip install "hydrone-gym[{extra}]"' if extra else error)
     except (ValueError, TypeError, OSError, DependencyNotInstalled) as error:
         return refused(error)
     return code
@@ -87,5 +88,5 @@ def _about(entry: EntryPoint) -> str:
     """Return the first line of a command's docstring, or why it cannot be loaded."""
     try:
         return (inspect.getdoc(entry.load()) or "").partition("\n")[0]
-    except Exception as error:  # of somebody else's package
+    except Exception as error:
         return f"cannot be loaded: {type(error).__name__}: {error}"

@@ -11,7 +11,7 @@ from typing import Any
 
 from hydrone_gym.evaluation.backends import runner
 from hydrone_gym.evaluation.plan import BrokenOff, Plan, PoliciesLike, SuiteLike, fly_job, make_plan
-from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
+from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run_folder import RunFolder, write_results
 from hydrone_gym.evaluation.suites import Suite
@@ -71,12 +71,12 @@ def evaluate(
 
 
 def evaluate_held_out(
-    policy: str, *, worlds: int = 1000, options: Mapping[str, Any] | None = None
+    policy: str | Factory, *, worlds: int = 1000, options: Mapping[str, Any] | None = None
 ) -> tuple[list[Record], list[dict[str, Any]]]:
     """Fly a policy through worlds of every mission that training does not see, in batches.
 
     Args:
-        policy: as `find_policy` takes it.
+        policy: as `find_policy` takes it, or a factory.
         worlds: a mission.
         options: keyword options of the environments, among them "vehicle" by its name.
 
@@ -85,7 +85,7 @@ def evaluate_held_out(
     """
     others = dict(options or {})
     vehicle = others.pop("vehicle", "paper")
-    records = evaluate(Suite.held_out(worlds, others), policy, worlds=worlds, vehicle=vehicle)
+    records = evaluate(Suite.held_out(worlds, others), {"agent": policy}, worlds=worlds, vehicle=vehicle)
     return records, scores_of(records)
 
 

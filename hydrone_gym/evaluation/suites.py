@@ -105,6 +105,8 @@ class Suite:
     @classmethod
     def held_out(cls, worlds: int, options: Mapping[str, Any] | None = None, *, name: str = "held-out") -> Self:
         """Return the worlds that every mission draws from the seeds from `HELD_OUT` on, to be flown in batches."""
+        if worlds < 1:
+            raise ValueError(f"worlds must be a whole number of at least 1, got {worlds}")
         seeds = range(HELD_OUT, HELD_OUT + worlds)
         drawn = (cls.drawn(env_id, seeds, options) for env_id in MISSIONS)
         return cls(name=name, missions=tuple(mission for suite in drawn for mission in suite.missions), batch=True)

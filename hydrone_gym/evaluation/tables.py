@@ -51,7 +51,11 @@ def _measures(title: str, summary: MissionSummary) -> Table:
         return (p.policy, *measures, f"{p.decision_ms_p50:.2f} / {p.decision_ms_p99:.2f}")
 
     heads = ("policy", "time (s)", "length (m)", "energy (J)", "decision\np50 / p99 (ms)")
-    return Table(title=f"{title}: flights that arrived, and decisions of all", heads=heads, rows=tuple(map(row, summary.policies)))
+    return Table(
+        title=f"{title}: flights that arrived, and decisions of all",
+        heads=heads,
+        rows=tuple(map(row, summary.policies)),
+    )
 
 
 def _differences(title: str, summary: MissionSummary) -> Table:

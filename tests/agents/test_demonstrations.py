@@ -11,8 +11,8 @@ import pytest
 
 from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Recording, demonstrate, record
-from agents.evaluation import HELD_OUT
 from hydrone_gym.cli import main
+from hydrone_gym.evaluation import HELD_OUT
 from hydrone_gym.evaluation.policies import find_policy
 
 OPTIONS = {"num_obstacles": 4, "vehicle": "physical"}

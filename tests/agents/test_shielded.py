@@ -3,12 +3,12 @@
 import gymnasium as gym
 import numpy as np
 
-from agents.evaluation import MISSIONS
 from agents.recipe import load_recipe
 from agents.shielded import INTERVENTION, ShieldedVecEnv
 from agents.vec_env import HydroneVecEnv
 from hydrone_gym import Outcome
 from hydrone_gym.envs.egocentric import Egocentric
+from hydrone_gym.evaluation import MISSIONS
 from planners.shield import Shield
 
 ID = MISSIONS[0]

@@ -15,7 +15,7 @@ from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import PolicySource
 from hydrone_gym.evaluation.records import HEADER, read_records, to_line
-from hydrone_gym.evaluation.results import write_results
+from hydrone_gym.evaluation.run_folder import write_results
 from hydrone_gym.evaluation.suites import Mission, Suite
 from hydrone_gym.evaluation.summary import summarise
 from hydrone_gym.evaluation.tables import tables_of
