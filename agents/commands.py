@@ -88,7 +88,7 @@ class Demonstrate:
     """Registered name, module:attribute, file.py:attribute or an agent's folder, also as LABEL=…"""
     out: Path = Path("demonstrations")
     """Folder of the datasets, one a mission."""
-    missions: tuple[Literal["mission", "air-to-water", "water-to-air"], ...] = tuple(_IDS)  # type: ignore[assignment]
+    missions: tuple[Literal["mission", "air-to-water", "water-to-air"], ...] = tuple(_IDS)  # type: ignore[arg-type]
     """What is flown: random missions, and the two experiments of the paper."""
     flights: int = 400
     """Flights a mission, each in a world of its own."""
@@ -191,11 +191,15 @@ class Failures:
 
     def run(self) -> int:
         """Fly, write everything to the folder, report and return the exit code."""
+        from agents.agent import PRETRAINED, shipped_agents
         from agents.failures.report import write_failure_report
 
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
-        policy = f"{self.agent}+shield" if self.shield else self.agent
+        behind = "+shield" if self.shield else ""
+        policy = f"{self.agent}{behind}"
+        if self.agent in shipped_agents():
+            policy = f"{policy}={PRETRAINED / self.agent}{behind}"
         text, document = write_failure_report(
             policy, self.out, worlds=self.episodes, options=options, progress=not self.json
         )

@@ -75,6 +75,8 @@ def measure(a: Arguments) -> dict[str, Any]:
     unknown = [name for name in a.shapes if name not in SHAPES]
     if unknown:
         raise ValueError(f"no shape {', '.join(map(repr, unknown))}: known are {', '.join(map(repr, SHAPES))}")
+    if a.episodes < 1:
+        raise ValueError(f"episodes must be at least 1, got {a.episodes}")
     sources, console, cells, began = find_policies(a.policies), Console(stderr=True), [], time.process_time()
     for name in a.shapes:
         for source in sources:

@@ -165,7 +165,7 @@ def fly_worlds(
                 length=None,
                 episode_return=float(returns[row]),
                 decision_ms=np.array(shares),
-                interventions=_interventions(memory, k),
+                interventions=_interventions(memory, int(k)),
             )
         on = np.flatnonzero(~over)
         running, memory, starts = running[on], _rows_of(memory, on), np.zeros(len(on), bool)

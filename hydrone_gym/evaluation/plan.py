@@ -212,8 +212,7 @@ def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:
 
 
 def _fly_batch(job: Job, env: gym.Env) -> list[Record]:
-    kind = {"num_envs": len(job.worlds), "vectorization_mode": "vector_entry_point"}
-    rows = gym.make_vec(job.env_id, **kind, **job.options)
+    rows = gym.make_vec(job.env_id, num_envs=len(job.worlds), vectorization_mode="vector_entry_point", **job.options)
     endings = fly_worlds(rows, job.policy.make(env, job.seed), scenarios=[scenario for _, scenario in job.worlds])
     return [record_of(key, ending) for key, ending in zip(job.keys, endings, strict=True)]
 

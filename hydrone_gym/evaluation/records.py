@@ -91,10 +91,16 @@ def record_of(key: Key, flight: Ending) -> Record:
     """Sum up a flight."""
     crossings = flight.transitions
     speeds = ("lateral_speed", "tilt", "vertical_speed")
-    largest = {name: max((abs(float(crossing[name])) for crossing in crossings), default=None) for name in speeds}
-    decisions = [value or 0.0 for value in percentiles(flight.decision_ms, (50.0, 99.0, 100.0))]
+    largest: dict[str, Any] = {
+        name: max((abs(float(crossing[name])) for crossing in crossings), default=None) for name in speeds
+    }
+    decisions: list[Any] = [value or 0.0 for value in percentiles(flight.decision_ms, (50.0, 99.0, 100.0))]
+    suite, mission, world, policy = key
     return Record(
-        **dict(zip(("suite", "mission", "world", "policy"), key, strict=True)),
+        suite=suite,
+        mission=mission,
+        world=world,
+        policy=policy,
         obstacles=flight.obstacles,
         outcome=flight.outcome.name,
         success=flight.outcome is Outcome.GOAL,

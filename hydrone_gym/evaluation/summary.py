@@ -1,7 +1,7 @@
 """An evaluation in numbers: each policy on each mission, ranked, and how it differs from a baseline on equal worlds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -152,36 +152,34 @@ def scores_of(records: Sequence[Record]) -> list[dict[str, Any]]:
 
 def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str) -> MissionSummary:
     flown = {name: [r for r in records if r.policy == name] for name in dict.fromkeys(r.policy for r in records)}
-    ranked = sorted(flown, key=lambda name: _order(flown[name]))
+    summed = [_policy(name, those) for name, those in flown.items()]
+    summed.sort(key=lambda p: (-p.success.value, np.inf if p.time is None else p.time.value))
     compared = {(record.mission, record.world): record for record in flown.get(baseline, [])}
-    pairs = {
-        name: [(r, compared[r.mission, r.world]) for r in flown[name] if (r.mission, r.world) in compared]
-        for name in ranked
-        if name != baseline
-    }
+    comparisons = []
+    for name in [p.policy for p in summed if p.policy != baseline]:
+        pairs = [(r, compared[r.mission, r.world]) for r in flown[name] if (r.mission, r.world) in compared]
+        comparisons += [_comparison(name, pairs)] if pairs else []
     return MissionSummary(
         suite=suite,
         mission=mission,
         baseline=baseline,
-        policies=tuple(_policy(name, rank, flown[name]) for rank, name in enumerate(ranked, start=1)),
-        comparisons=tuple(_comparison(name, same_worlds) for name, same_worlds in pairs.items() if same_worlds),
+        policies=tuple(replace(entry, rank=rank) for rank, entry in enumerate(summed, start=1)),
+        comparisons=tuple(comparisons),
     )
 
 
-def _order(records: Sequence[Record]) -> tuple[float, float]:
-    """What policies are ranked by: more success first, then less time."""
-    arrived = [record.time for record in records if record.success]
-    return -len(arrived) / len(records), interquartile_mean(arrived).value if arrived else np.inf
-
-
-def _policy(name: str, rank: int, records: Sequence[Record]) -> PolicySummary:
+def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
     arrived = [record for record in records if record.success]
     low, high = wilson_interval(len(arrived), len(records))
     outcomes = [record.outcome for record in records]
-    interventions = [record.interventions for record in records if record.interventions is not None]
+
+    def there(name: str, among: Sequence[Record] = records) -> list[float]:
+        return [getattr(r, name) for r in among if getattr(r, name) is not None]
+
+    interventions = there("interventions")
     return PolicySummary(
         policy=name,
-        rank=rank,
+        rank=0,
         worlds=len(records),
         success=Estimate(len(arrived) / len(records), low, high),
         collisions=outcomes.count(Outcome.COLLISION.name),
@@ -189,15 +187,15 @@ def _policy(name: str, rank: int, records: Sequence[Record]) -> PolicySummary:
         timeouts=outcomes.count(Outcome.TIMEOUT.name),
         out_of_bounds=outcomes.count(Outcome.OUT_OF_BOUNDS.name),
         diverged=outcomes.count(Outcome.DIVERGED.name),
-        time=_estimate([record.time for record in arrived]),
-        length=_estimate([record.length for record in arrived if record.length is not None]),
-        energy=_estimate([record.energy for record in arrived]),
-        clearance=min((r.clearance for r in records if r.clearance is not None), default=None),
-        lateral_speed=max((r.lateral_speed for r in records if r.lateral_speed is not None), default=None),
-        tilt=max((r.tilt for r in records if r.tilt is not None), default=None),
+        time=_estimate(there("time", arrived)),
+        length=_estimate(there("length", arrived)),
+        energy=_estimate(there("energy", arrived)),
+        clearance=min(there("clearance"), default=None),
+        lateral_speed=max(there("lateral_speed"), default=None),
+        tilt=max(there("tilt"), default=None),
         interventions=float(np.mean(interventions)) if interventions else None,
-        decision_ms_p50=float(np.median([record.decision_ms_p50 for record in records])),
-        decision_ms_p99=float(np.median([record.decision_ms_p99 for record in records])),
+        decision_ms_p50=float(np.median(there("decision_ms_p50"))),
+        decision_ms_p99=float(np.median(there("decision_ms_p99"))),
     )
 
 

@@ -41,7 +41,7 @@ def _outcomes(title: str, summary: MissionSummary) -> Table:
         return (f"{p.rank}. {p.policy}", str(p.worlds), success, *map(str, counts), clearance, shield)
 
     counts = ("collisions", "rough\ncrossings", "timeouts", "other")
-    heads = ("policy", "worlds", "success (%)", *counts, "least\nclearance (m)", "interventions")
+    heads = ("policy", "worlds", "success (%)", *counts, "least clear-\nance (m)", "inter-\nventions")
     return Table(title=f"{title}: outcomes", heads=heads, rows=tuple(map(row, summary.policies)))
 
 
