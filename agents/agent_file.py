@@ -27,21 +27,13 @@ _LARGEST = 50_000_000  # bytes of tensors: a policy network is far smaller
 
 @dataclass(frozen=True, kw_only=True)
 class AgentFile:
-    """What an agent's files hold.
+    """What an agent's files hold."""
 
-    Attributes:
-        name: of the agent.
-        algorithm: that trained it.
-        environment: id it was trained on, with the version.
-        network: egocentric observation (68,) to relative action (3,).
-        notes: further plain data about its training: steps, seed, versions.
-    """
-
-    name: str
-    algorithm: str
-    environment: str
-    network: Network
-    notes: dict[str, Any] = field(default_factory=dict)
+    name: str  # of the agent
+    algorithm: str  # that trained it
+    environment: str  # id it was trained on, with the version
+    network: Network  # egocentric observation (68,) to relative action (3,)
+    notes: dict[str, Any] = field(default_factory=dict)  # further plain data about its training: steps, seed, versions
 
 
 def observation_fingerprint() -> str:

@@ -16,19 +16,13 @@ from agents.network import Network
 
 @dataclass(frozen=True, kw_only=True)
 class Algorithm:
-    """One class of Stable-Baselines3 and how its models are built and taken apart.
+    """One class of Stable-Baselines3 and how its models are built and taken apart."""
 
-    Attributes:
-        model: the class.
-        mean: from its policy to the modules, in order, whose output is the mean action before squashing.
-        output: what squashes it: "tanh", or "linear" for nothing.
-        log_interval: updates, or for off-policy algorithms episodes, between two points in TensorBoard.
-    """
-
-    model: type[BaseAlgorithm]
+    model: type[BaseAlgorithm]  # the class
+    # from its policy to the modules, in order, whose output is the mean action before squashing
     mean: Callable[[Any], Sequence[torch.nn.Module]]
-    output: str
-    log_interval: int
+    output: str  # what squashes it: "tanh", or "linear" for nothing
+    log_interval: int  # updates, or for off-policy algorithms episodes, between two points in TensorBoard
 
 
 def _ppo_mean(policy: Any) -> Sequence[torch.nn.Module]:

@@ -37,30 +37,19 @@ _LEVEL = 1e-6  # m: a shorter horizontal way from start to goal gives no directi
 class Cloning:
     """What is learnt from, how, and where the agent goes.
 
-    Attributes:
-        data: folder of one dataset or of several, flown with the same options.
-        out: the agent's folder, made if missing; must not hold one.
-        seed: of the weights and of the order of the pairs.
-        hidden: outputs of each hidden layer.
-        epochs: times that every pair is learnt from.
-        batch: pairs a step.
-        learning_rate: of Adam at the beginning.
-        held_back: share of the flights that are not learnt from, to measure the error on.
-        progress: show a bar on stderr.
-
     Raises:
         ValueError: a number out of range.
     """
 
-    data: Path
-    out: Path
-    seed: int = 0
-    hidden: tuple[int, ...] = (128, 128)
-    epochs: int = 400
-    batch: int = 512
-    learning_rate: float = 1e-3
-    held_back: float = 0.1
-    progress: bool = False
+    data: Path  # folder of one dataset or of several, flown with the same options
+    out: Path  # the agent's folder, made if missing; must not hold one
+    seed: int = 0  # of the weights and of the order of the pairs
+    hidden: tuple[int, ...] = (128, 128)  # outputs of each hidden layer
+    epochs: int = 400  # times that every pair is learnt from
+    batch: int = 512  # pairs a step
+    learning_rate: float = 1e-3  # of Adam at the beginning
+    held_back: float = 0.1  # share of the flights that are not learnt from, to measure the error on
+    progress: bool = False  # show a bar on stderr
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -83,25 +72,15 @@ class Pairs(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Cloned:
-    """What came of it.
+    """What came of it."""
 
-    Attributes:
-        agent: as it was saved.
-        options: of the environments that were flown.
-        flights: successful ones, those learnt from and those held back.
-        pairs: learnt from.
-        clipped: share of all pairs whose reference lay beyond the reach of a relative action.
-        losses: (epochs,) mean squared error of the batches of each epoch.
-        held_back_loss: mean squared error on the flights held back; None if there are none.
-    """
-
-    agent: AgentFile
-    options: dict[str, Any]
-    flights: tuple[int, int]
-    pairs: int
-    clipped: float
-    losses: list[float] = field(repr=False)
-    held_back_loss: float | None
+    agent: AgentFile  # as it was saved
+    options: dict[str, Any]  # of the environments that were flown
+    flights: tuple[int, int]  # successful ones, those learnt from and those held back
+    pairs: int  # learnt from
+    clipped: float  # share of all pairs whose reference lay beyond the reach of a relative action
+    losses: list[float] = field(repr=False)  # (epochs,) mean squared error of the batches of each epoch
+    held_back_loss: float | None  # mean squared error on the flights held back; None if there are none
 
     def notes(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -40,26 +40,17 @@ _PACKAGES = (*provenance.PACKAGES, "minari")
 class Recording:
     """What is flown and where it is written.
 
-    Attributes:
-        root: folder of the datasets, made if missing.
-        policy: what `hydrone_gym.evaluation.policies.find_policy` takes.
-        missions: environment ids, a dataset each.
-        flights: a mission, each in a world of its own.
-        seed: of the first world; flight k is in the world that the environment draws from ``seed + k``.
-        options: keyword options of the environments, plain data.
-        progress: show a bar on stderr.
-
     Raises:
         ValueError: no flights, seeds that are held out for evaluation, or an option that cannot be recorded.
     """
 
-    root: Path
-    policy: str = "clrrt"
-    missions: tuple[str, ...] = MISSIONS
-    flights: int = 400
-    seed: int = FIRST_SEED
-    options: dict[str, Any] = field(default_factory=dict)
-    progress: bool = False
+    root: Path  # folder of the datasets, made if missing
+    policy: str = "clrrt"  # what `hydrone_gym.evaluation.policies.find_policy` takes
+    missions: tuple[str, ...] = MISSIONS  # environment ids, a dataset each
+    flights: int = 400  # a mission, each in a world of its own
+    seed: int = FIRST_SEED  # of the first world; flight k is in the world that the environment draws from ``seed + k``
+    options: dict[str, Any] = field(default_factory=dict)  # keyword options of the environments, plain data
+    progress: bool = False  # show a bar on stderr
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -98,23 +89,14 @@ class Demonstration:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Demonstrations:
-    """A dataset: flights of one policy on one mission.
+    """A dataset: flights of one policy on one mission."""
 
-    Attributes:
-        env_id: of the environment.
-        options: its keyword options.
-        policy: what flew.
-        versions: of the packages it was recorded with.
-        sha256: of the data.
-        flights: in order of their seeds.
-    """
-
-    env_id: str
-    options: dict[str, Any]
-    policy: str
-    versions: dict[str, str]
-    sha256: str
-    flights: tuple[Demonstration, ...]
+    env_id: str  # of the environment
+    options: dict[str, Any]  # its keyword options
+    policy: str  # what flew
+    versions: dict[str, str]  # of the packages it was recorded with
+    sha256: str  # of the data
+    flights: tuple[Demonstration, ...]  # in order of their seeds
 
     def make_env(self) -> gym.Env:
         """Make the environment that was flown."""

@@ -18,24 +18,15 @@ LINEAR = "lin_"  # prefix of a value that falls linearly to zero over the traini
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """How to train.
+    """How to train."""
 
-    Attributes:
-        algorithm: name of the file, "ppo".
-        steps: transitions to learn from.
-        missions: rows an environment id, in order.
-        policy: name of the policy class of Stable-Baselines3.
-        settings: the other arguments of the algorithm, as written in the file.
-        shield: whether the rows fly behind the shield.
-        environment: keyword options of the environments that the rows fly in, where the defaults are not meant.
-    """
-
-    algorithm: str
-    steps: int
-    missions: dict[str, int]
-    policy: str
-    settings: dict[str, Any]
-    shield: bool = False
+    algorithm: str  # name of the file, "ppo"
+    steps: int  # transitions to learn from
+    missions: dict[str, int]  # rows an environment id, in order
+    policy: str  # name of the policy class of Stable-Baselines3
+    settings: dict[str, Any]  # the other arguments of the algorithm, as written in the file
+    shield: bool = False  # whether the rows fly behind the shield
+    # keyword options of the environments that the rows fly in, where the defaults are not meant
     environment: dict[str, Any] = field(default_factory=dict)
 
     @property

@@ -36,37 +36,24 @@ PACKAGES = ("hydrone-gym", "stable_baselines3", "sb3_contrib", "torch", "gymnasi
 class TrainingRun:
     """What is trained, where, and from what.
 
-    Attributes:
-        folder: run folder, made by `train`; must not hold a run already.
-        algorithm: name of a recipe of the package.
-        seed: of everything random; one seed and one thread give the same weights again.
-        steps: transitions, the recipe's number unless given.
-        recipe: path of a YAML file to use instead of the package's.
-        options: keyword options of the environments, `num_obstacles` and so on, in training and evaluation; they go
-            before those of the recipe, which are for training alone.
-        start_from: run folder whose latest weights to begin with, None for new ones.
-        threads: of torch; with one, results repeat bit for bit.
-        checkpoint_every: least number of steps between checkpoints.
-        evaluation_episodes: held-out worlds a mission at the end, 0 for none.
-        progress: show a bar on stderr.
-        tensorboard: also write Stable-Baselines3's own log for TensorBoard.
-
     Raises:
         ValueError: an option out of range, or TensorBoard asked for and not installed.
     """
 
-    folder: Path
-    algorithm: str = "ppo"
-    seed: int = 0
-    steps: int | None = None
-    recipe: Path | None = None
+    folder: Path  # run folder, made by `train`; must not hold a run already
+    algorithm: str = "ppo"  # name of a recipe of the package
+    seed: int = 0  # of everything random; one seed and one thread give the same weights again
+    steps: int | None = None  # transitions, the recipe's number unless given
+    recipe: Path | None = None  # path of a YAML file to use instead of the package's
+    # keyword options of the environments, `num_obstacles` and so on, in training and evaluation; they go before those
+    # of the recipe, which are for training alone
     options: dict[str, Any] = field(default_factory=dict)
-    start_from: Path | None = None
-    threads: int = 1
-    checkpoint_every: int = 500_000
-    evaluation_episodes: int = 1000
-    progress: bool = True
-    tensorboard: bool = False
+    start_from: Path | None = None  # run folder whose latest weights to begin with, None for new ones
+    threads: int = 1  # of torch; with one, results repeat bit for bit
+    checkpoint_every: int = 500_000  # least number of steps between checkpoints
+    evaluation_episodes: int = 1000  # held-out worlds a mission at the end, 0 for none
+    progress: bool = True  # show a bar on stderr
+    tensorboard: bool = False  # also write Stable-Baselines3's own log for TensorBoard
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -85,31 +85,18 @@ class Chance(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Failure:
-    """One flight that did not arrive.
+    """One flight that did not arrive."""
 
-    Attributes:
-        mission: environment id.
-        seed: of the world.
-        outcome: how it ended.
-        cause: one of `CAUSES`.
-        end: where and how.
-        contact: of a collision, else None.
-        chance: None for a time-out, and if there never was one.
-        stayed_s: how long it had been within 1 m of where it ended, s.
-        interventions: periods in which a shield flew another reference than proposed; None without one.
-        path: (K, 2) share of the way and height in m, at every decision and at the end.
-    """
-
-    mission: str
-    seed: int
-    outcome: Outcome
-    cause: str
-    end: End
-    contact: Contact | None
-    chance: Chance | None
-    stayed_s: float
-    interventions: int | None
-    path: NDArray[np.float64]
+    mission: str  # environment id
+    seed: int  # of the world
+    outcome: Outcome  # how it ended
+    cause: str  # one of `CAUSES`
+    end: End  # where and how
+    contact: Contact | None  # of a collision, else None
+    chance: Chance | None  # None for a time-out, and if there never was one
+    stayed_s: float  # how long it had been within 1 m of where it ended, s
+    interventions: int | None  # periods in which a shield flew another reference than proposed; None without one
+    path: NDArray[np.float64]  # (K, 2) share of the way and height in m, at every decision and at the end
 
 
 def examine(failed: FailedFlight) -> Failure:

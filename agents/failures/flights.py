@@ -18,26 +18,15 @@ from planners.shield import HELD, Shield
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FailedFlight:
-    """A flight that did not arrive.
+    """A flight that did not arrive."""
 
-    Attributes:
-        mission: environment id.
-        seed: of its world.
-        world: of its environment.
-        flight: the whole record, every tick.
-        known: for each of the world's M spheres the time (s) of the first decision made knowing it, inf for none.
-        stoppable: (K,) whether a safe stop could still be chosen at each decision; None for a time-out, which nobody
-            needed to stop for.
-        period: s between decisions.
-    """
-
-    mission: str
-    seed: int
-    world: World
-    flight: Flight
-    known: NDArray[np.float64]
-    stoppable: NDArray[np.bool_] | None
-    period: float
+    mission: str  # environment id
+    seed: int  # of its world
+    world: World  # of its environment
+    flight: Flight  # the whole record, every tick
+    known: NDArray[np.float64]  # (M,) s, first decision made knowing each of the world's spheres, inf for none
+    stoppable: NDArray[np.bool_] | None  # (K,) whether a safe stop could still be chosen; None for a time-out
+    period: float  # s between decisions
 
 
 class DecisionRecorder:

@@ -28,53 +28,31 @@ class Trace(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ending:
-    """How an episode ended and what it took.
+    """How an episode ended and what it took."""
 
-    Attributes:
-        obstacles: spheres in its world.
-        outcome: how it ended.
-        time: s.
-        energy: of the rotors' shafts, J.
-        clearance: least distance of the vehicle's sphere to an obstacle, m; infinite without obstacles.
-        transitions: a dict for each crossing: time (s), direction, lateral_speed (m/s), tilt (rad),
-            vertical_speed (m/s).
-        length: of the path, summed over ticks, m; None in a batch, which does not keep them.
-        episode_return: sum of rewards.
-        decision_ms: (K,) wall-clock time of each decision, ms; in a batch its share of that of all rows.
-        interventions: periods in which a shield flew another reference than proposed; None for a policy whose memory
-            does not count them.
-    """
-
-    obstacles: int
-    outcome: Outcome
-    time: float
-    energy: float
-    clearance: float
+    obstacles: int  #: spheres in its world
+    outcome: Outcome  #: how it ended
+    time: float  #: s
+    energy: float  #: of the rotors' shafts, J
+    clearance: float  #: least distance of the vehicle's sphere to an obstacle, m; infinite without obstacles
+    #: of the surface: time (s), direction, lateral_speed (m/s), tilt (rad), vertical_speed (m/s)
     transitions: list[dict[str, Any]]
-    length: float | None
-    episode_return: float
-    decision_ms: NDArray[np.float64]
-    interventions: int | None
+    length: float | None  #: of the path, summed over ticks, m; None in a batch, which does not keep them
+    episode_return: float  #: sum of rewards
+    decision_ms: NDArray[np.float64]  #: (K,) wall-clock time of each decision, ms; in a batch its share
+    interventions: int | None  #: periods in which a shield flew another reference; None where nothing counts them
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Flight(Ending):
-    """A flown episode.
-
-    Attributes:
-        scenario: what was flown.
-        references: (K, 4) those in force at the end of each period, the action after clipping: m, m, m, rad.
-        states: (K + 1, 12) at the start and after each period, as in the observation.
-        detected: (k, 4) spheres x, y, z, r in m, in order of detection.
-        trace: the same flight every tick.
-    """
+    """A flown episode."""
 
     length: float
-    scenario: Scenario
-    references: NDArray[np.float64]
-    states: NDArray[np.float64]
-    detected: NDArray[np.float64]
-    trace: Trace
+    scenario: Scenario  #: what was flown
+    references: NDArray[np.float64]  #: (K, 4) in force at the end of each period, actions clipped: m, m, m, rad
+    states: NDArray[np.float64]  #: (K + 1, 12) at the start and after each period, as in the observation
+    detected: NDArray[np.float64]  #: (k, 4) spheres x, y, z, r in m, in order of detection
+    trace: Trace  #: the same flight every tick
 
     @property
     def undetected(self) -> NDArray[np.float64]:

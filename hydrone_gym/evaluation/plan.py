@@ -39,25 +39,16 @@ class BrokenOff(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What one call of `fly_job` flies.
+    """What one call of `fly_job` flies."""
 
-    Attributes:
-        policy: what flies.
-        seed: for policies that draw.
-        env_id, options: registered id of the environment, and its keyword options.
-        suite, mission: names for the records.
-        worlds: number and scenario of each world.
-        batch: whether to fly them all at once.
-    """
-
-    policy: PolicySource
-    seed: int
-    env_id: str
+    policy: PolicySource  # what flies
+    seed: int  # for policies that draw
+    env_id: str  # registered id of the environment
     options: Mapping[str, Any]
-    suite: str
+    suite: str  # name for the records, as the next
     mission: str
-    worlds: tuple[tuple[int, Scenario], ...]
-    batch: bool
+    worlds: tuple[tuple[int, Scenario], ...]  # number and scenario of each world
+    batch: bool  # whether to fly them all at once
 
     @property
     def keys(self) -> list[Key]:
@@ -71,19 +62,12 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What an evaluation flies; build it with `make_plan`.
+    """What an evaluation flies; build it with `make_plan`."""
 
-    Attributes:
-        suites: with no more worlds than are flown.
-        policies: what flies them.
-        seed: given to policies that draw.
-        vehicle: "paper" or "physical".
-    """
-
-    suites: tuple[Suite, ...]
-    policies: tuple[PolicySource, ...]
-    seed: int
-    vehicle: str
+    suites: tuple[Suite, ...]  # with no more worlds than are flown
+    policies: tuple[PolicySource, ...]  # what flies them
+    seed: int  # given to policies that draw
+    vehicle: str  # "paper" or "physical"
 
     def jobs(self) -> Iterator[Job]:
         """Yield all jobs: policies take turns on the same few worlds, so what is done is comparable at any moment."""

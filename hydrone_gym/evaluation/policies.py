@@ -67,21 +67,13 @@ Factory = Callable[..., Policy]
 
 @dataclass(frozen=True, kw_only=True)
 class PolicySource:
-    """What a policy is made from; plain data that can be sent to another process.
+    """What a policy is made from; plain data that can be sent to another process."""
 
-    Attributes:
-        label: what tables call it.
-        factory: "module:attribute", "/path/file.py:attribute", or the factory itself.
-        search: folder that modules are imported from besides those installed; empty for none.
-        folder: of a trained agent, handed to the factory before the environment; empty for none.
-        wrapper: "module:attribute" of what is put around the policy; empty for nothing.
-    """
-
-    label: str
-    factory: str | Factory
-    search: str = ""
-    folder: str = ""
-    wrapper: str = ""
+    label: str  # what tables call it
+    factory: str | Factory  # "module:attribute", "/path/file.py:attribute", or the factory itself
+    search: str = ""  # folder that modules are imported from besides those installed; empty for none
+    folder: str = ""  # of a trained agent, handed to the factory before the environment; empty for none
+    wrapper: str = ""  # "module:attribute" of what is put around the policy; empty for nothing
 
     def make(self, env: Any, seed: int) -> Policy:
         """Return a new policy for an environment.

@@ -18,52 +18,28 @@ Key = tuple[str, str, int, str]
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """One flight; None is an empty cell, where there is nothing to tell.
+    """One flight; None is an empty cell, where there is nothing to tell."""
 
-    Attributes:
-        suite: name of the suite, with its version.
-        mission: name of the mission in it.
-        world: number of the world in the mission, from 0.
-        obstacles: spheres in that world.
-        policy: what the evaluation calls it.
-        outcome: name of an `Outcome`.
-        success: whether that is GOAL.
-        time: s.
-        energy: of the rotors' shafts, J.
-        length: of the path, m; None for a flight in a batch.
-        clearance: least distance of the vehicle's sphere to an obstacle, m; None without obstacles.
-        crossings: of the surface.
-        crossing_time: of the first one, s.
-        lateral_speed: largest at a crossing, m/s.
-        tilt: largest at a crossing, rad.
-        vertical_speed: largest at a crossing, either way, m/s.
-        interventions: periods in which a shield flew another reference; None without a shield.
-        episode_return: sum of rewards.
-        decisions: periods flown.
-        decision_ms_p50, decision_ms_p99, decision_ms_max: wall-clock time of a decision, ms. Only these differ from run
-            to run.
-    """
-
-    suite: str
-    mission: str
-    world: int
-    obstacles: int
-    policy: str
-    outcome: str
-    success: bool
-    time: float
-    energy: float
-    length: float | None
-    clearance: float | None
-    crossings: int
-    crossing_time: float | None
-    lateral_speed: float | None
-    tilt: float | None
-    vertical_speed: float | None
-    interventions: int | None
-    episode_return: float
-    decisions: int
-    decision_ms_p50: float
+    suite: str  #: name of the suite, with its version
+    mission: str  #: name of the mission in it
+    world: int  #: number of the world in the mission, from 0
+    obstacles: int  #: spheres in that world
+    policy: str  #: what the evaluation calls it
+    outcome: str  #: name of an `Outcome`
+    success: bool  #: whether that is GOAL
+    time: float  #: s
+    energy: float  #: of the rotors' shafts, J
+    length: float | None  #: of the path, m; None for a flight in a batch
+    clearance: float | None  #: least distance of the vehicle's sphere to an obstacle, m; None without obstacles
+    crossings: int  #: of the surface
+    crossing_time: float | None  #: of the first one, s
+    lateral_speed: float | None  #: largest at a crossing, m/s
+    tilt: float | None  #: largest at a crossing, rad
+    vertical_speed: float | None  #: largest at a crossing, either way, m/s
+    interventions: int | None  #: periods in which a shield flew another reference; None without a shield
+    episode_return: float  #: sum of rewards
+    decisions: int  #: periods flown
+    decision_ms_p50: float  #: wall-clock time of a decision, ms; only these three differ from run to run
     decision_ms_p99: float
     decision_ms_max: float
 

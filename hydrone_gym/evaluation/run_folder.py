@@ -146,19 +146,12 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Stored:
-    """What an evaluation left.
+    """What an evaluation left."""
 
-    Attributes:
-        document: the summary as plain data.
-        summaries: its missions.
-        tables: those of each summary.
-        records: the rows, at least one.
-    """
-
-    document: Mapping[str, Any]
-    summaries: Sequence[MissionSummary]
-    tables: Sequence[Sequence[Table]]
-    records: Sequence[Record]
+    document: Mapping[str, Any]  # the summary as plain data
+    summaries: Sequence[MissionSummary]  # its missions
+    tables: Sequence[Sequence[Table]]  # those of each summary
+    records: Sequence[Record]  # the rows, at least one
 
     @property
     def arguments(self) -> Mapping[str, Any]:

@@ -61,27 +61,17 @@ def plain(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SavedFlight:
-    """A flight in a file of `hydrone fly`.
+    """A flight in a file of `hydrone fly`."""
 
-    Attributes:
-        name: what the file calls it.
-        policy, seed, vehicle: options it was flown with.
-        scenario: what was flown.
-        references: (K, 4) a period: m, m, m, rad.
-        states: (K + 1, 12) at the start and after each period.
-        detected: (k, 4) spheres in order of detection, m.
-        record: everything the file says of it, see `flight_record`.
-    """
-
-    name: str
-    policy: str
+    name: str  # what the file calls it
+    policy: str  # option it was flown with, as the next two
     seed: int
     vehicle: str
-    scenario: Scenario
-    references: NDArray[np.float64]
-    states: NDArray[np.float64]
-    detected: NDArray[np.float64]
-    record: dict[str, Any]
+    scenario: Scenario  # what was flown
+    references: NDArray[np.float64]  # (K, 4) a period: m, m, m, rad
+    states: NDArray[np.float64]  # (K + 1, 12) at the start and after each period
+    detected: NDArray[np.float64]  # (k, 4) spheres in order of detection, m
+    record: dict[str, Any]  # everything the file says of it, see `flight_record`
 
 
 def read_flights(path: str | Path) -> list[SavedFlight]:

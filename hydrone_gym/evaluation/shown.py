@@ -34,19 +34,13 @@ class Writer(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """The flights that show a policy.
+    """The flights that show a policy."""
 
-    Attributes:
-        policy: its name.
-        best: arrived soonest.
-        median: in the middle, by time, of those that arrived.
-        worst: the soonest collision; without collisions the soonest rough crossing, and so on down to timeouts; the
-            slowest flight where all arrived.
-    """
-
-    policy: str
-    best: Record
-    median: Record
+    policy: str  # its name
+    best: Record  # arrived soonest
+    median: Record  # in the middle, by time, of those that arrived
+    # the soonest collision; without collisions the soonest rough crossing, and so on down to timeouts; the slowest
+    # flight where all arrived
     worst: Record
 
 

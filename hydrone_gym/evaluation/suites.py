@@ -33,20 +33,15 @@ _PARTS = ("start", "goal", "obstacles")
 class Mission:
     """Scenarios of one kind and the environment they are flown in.
 
-    Attributes:
-        name: what tables call it.
-        env_id: registered id of the environment.
-        options: keyword options of that environment, plain data; "vehicle" and "interface" are not among them.
-        scenarios: the worlds; world k of the mission is entry k.
-
     Raises:
         ValueError: no scenario, or an option that belongs to the evaluation.
     """
 
-    name: str
-    env_id: str
+    name: str  #: what tables call it
+    env_id: str  #: registered id of the environment
+    #: keyword options of that environment, plain data; "vehicle" and "interface" are not among them
     options: Mapping[str, Any]
-    scenarios: tuple[Scenario, ...]
+    scenarios: tuple[Scenario, ...]  #: the worlds; world k of the mission is entry k
 
     def __post_init__(self) -> None:
         """Check what would fail later, far from its cause."""
@@ -61,18 +56,13 @@ class Mission:
 class Suite:
     """Missions under one name.
 
-    Attributes:
-        name: what tables call it, for a frozen suite with its version.
-        missions: each with a name of its own.
-        batch: whether its worlds are flown many at once.
-
     Raises:
         ValueError: no mission, or two of one name.
     """
 
-    name: str
-    missions: tuple[Mission, ...]
-    batch: bool = False
+    name: str  #: what tables call it, for a frozen suite with its version
+    missions: tuple[Mission, ...]  #: each with a name of its own
+    batch: bool = False  #: whether its worlds are flown many at once
 
     def __post_init__(self) -> None:
         """Check that rows can tell the missions apart."""

@@ -16,85 +16,52 @@ BASELINE = "clrrt"  # policy that the others are compared with unless another is
 
 @dataclass(frozen=True, kw_only=True)
 class PolicySummary:
-    """One policy on the worlds of a mission.
+    """One policy on the worlds of a mission."""
 
-    Attributes:
-        policy: its name.
-        rank: from 1, by success, then by time.
-        worlds: flights.
-        success: share that arrived, with the 95 % Wilson interval.
-        collisions, rough_crossings, timeouts, out_of_bounds, diverged: flights that ended so.
-        time, length, energy: s, m and J of the flights that arrived: interquartile mean and 95 % bootstrap interval;
-            None if none did, and for the length of flights in batches.
-        clearance: least distance to an obstacle over all flights, m; None without obstacles.
-        lateral_speed, tilt: largest at a crossing over all flights, m/s and rad; None without crossings.
-        interventions: of the shield, mean a flight; None without a shield.
-        decision_ms_p50, decision_ms_p99: medians over flights of each flight's percentile, ms.
-    """
-
-    policy: str
-    rank: int
-    worlds: int
-    success: Estimate
-    collisions: int
+    policy: str  #: its name
+    rank: int  #: from 1, by success, then by time
+    worlds: int  #: flights
+    success: Estimate  #: share that arrived, with the 95 % Wilson interval
+    collisions: int  #: flights that ended so, as in the next four
     rough_crossings: int
     timeouts: int
     out_of_bounds: int
     diverged: int
-    time: Estimate | None
-    length: Estimate | None
-    energy: Estimate | None
-    clearance: float | None
-    lateral_speed: float | None
-    tilt: float | None
-    interventions: float | None
-    decision_ms_p50: float
+    time: Estimate | None  #: s, of those that arrived: interquartile mean, 95 % bootstrap interval; None if none did
+    length: Estimate | None  #: likewise, m; None for flights in batches too
+    energy: Estimate | None  #: likewise, J
+    clearance: float | None  #: least distance to an obstacle over all flights, m; None without obstacles
+    lateral_speed: float | None  #: largest at a crossing over all flights, m/s; None without crossings
+    tilt: float | None  #: likewise, rad
+    interventions: float | None  #: of the shield, mean a flight; None without a shield
+    decision_ms_p50: float  #: median over flights of each flight's percentile, ms
     decision_ms_p99: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A policy against the baseline on the worlds that both flew; differences are the policy's less the baseline's.
+    """A policy against the baseline on the worlds that both flew; differences are the policy's less the baseline's."""
 
-    Attributes:
-        policy: its name.
-        worlds: that both flew.
-        success: difference of the success rates with Newcombe's 95 % interval for pairs.
-        only_policy, only_baseline: worlds in which one alone arrived.
-        p_value: of McNemar's exact test, two-sided.
-        both: worlds in which both arrived.
-        time, energy: interquartile mean of the differences over those, s and J, with 95 % bootstrap interval; None if
-            there are none.
-    """
-
-    policy: str
-    worlds: int
-    success: Estimate
-    only_policy: int
+    policy: str  #: its name
+    worlds: int  #: that both flew
+    success: Estimate  #: difference of the success rates with Newcombe's 95 % interval for pairs
+    only_policy: int  #: worlds in which it alone arrived
     only_baseline: int
-    p_value: float
-    both: int
-    time: Estimate | None
-    energy: Estimate | None
+    p_value: float  #: of McNemar's exact test, two-sided
+    both: int  #: worlds in which both arrived
+    time: Estimate | None  #: interquartile mean over those, s, with 95 % bootstrap interval; None if there are none
+    energy: Estimate | None  #: likewise, J
 
 
 @dataclass(frozen=True, kw_only=True)
 class MissionSummary:
-    """All policies on one mission of a suite, or on all its missions together.
+    """All policies on one mission of a suite, or on all its missions together."""
 
-    Attributes:
-        suite: its name.
-        mission: its name, or `ALL_MISSIONS`.
-        baseline: policy that the others are compared with.
-        policies: by rank.
-        comparisons: every other policy with the baseline, by rank.
-    """
-
-    suite: str
-    mission: str
-    baseline: str
-    policies: tuple[PolicySummary, ...]
-    comparisons: tuple[Comparison, ...]
+    suite: str  #: its name
+    mission: str  #: its name, or `ALL_MISSIONS`
+    baseline: str  #: policy that the others are compared with
+    policies: tuple[PolicySummary, ...]  #: by rank
+    comparisons: tuple[Comparison, ...]  #: every other policy with the baseline, by rank
 
 
 def summarise(records: Sequence[Record], baseline: str | None = None) -> list[MissionSummary]:
