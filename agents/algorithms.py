@@ -1,7 +1,7 @@
 """The algorithms that can be trained, and how an agent is taken out of a model of theirs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,18 +29,10 @@ def _ppo_mean(policy: Any) -> Sequence[torch.nn.Module]:
     return [*policy.mlp_extractor.policy_net, policy.action_net]
 
 
-def _gaussian_mean(policy: Any) -> Sequence[torch.nn.Module]:
-    return [*policy.actor.latent_pi, policy.actor.mu]
-
-
-def _td3_mean(policy: Any) -> Sequence[torch.nn.Module]:
-    return [*policy.actor.mu][:-1]  # the last module is its tanh
-
-
 _PPO = Algorithm(model=PPO, mean=_ppo_mean, output="linear", log_interval=1)
-_SAC = Algorithm(model=SAC, mean=_gaussian_mean, output="tanh", log_interval=1000)
-_TD3 = Algorithm(model=TD3, mean=_td3_mean, output="tanh", log_interval=1000)
-_TQC = Algorithm(model=TQC, mean=_gaussian_mean, output="tanh", log_interval=1000)
+_SAC = Algorithm(model=SAC, mean=lambda p: [*p.actor.latent_pi, p.actor.mu], output="tanh", log_interval=1000)
+_TQC = replace(_SAC, model=TQC)
+_TD3 = replace(_SAC, model=TD3, mean=lambda policy: [*policy.actor.mu][:-1])  # the last module is its tanh
 
 # by the name of the recipe, agents/hyperparameters/<name>.yml
 ALGORITHMS = {"ppo": _PPO, "ppo_shielded": _PPO, "sac": _SAC, "td3": _TD3, "tqc": _TQC}

@@ -69,24 +69,15 @@ def _read(data: Path) -> Demonstrations:
 
 
 def _flight(episode: dict[str, Any], seed: int, env: gym.Env) -> Demonstration:
-    """Check one flight against the spaces of its environment; ValueError says what does not fit."""
-    name, periods = f"episode {episode['id']}", len(episode["rewards"])
-    boxes: Any = env.observation_space
-    wanted = {f"observations[{key!r}]": (periods + 1, *box.shape, box.dtype) for key, box in boxes.items()}
-    wanted |= {f"infos[{key!r}]": (periods + 1, np.dtype(kind)) for key, kind in INFOS.items()}
-    wanted |= {"actions": (periods, *(env.action_space.shape or ()), env.action_space.dtype)}
-    wanted |= {"rewards": (periods, np.dtype(np.float64))}
-    wanted |= {key: (periods, np.dtype(bool)) for key in ("terminations", "truncations")}
-    found = {f"observations[{key!r}]": array for key, array in episode["observations"].items()}
-    found |= {f"infos[{key!r}]": array for key, array in (episode["infos"] or {}).items()}
-    for key, (*shape, dtype) in wanted.items():
-        array = found.get(key, episode.get(key))
-        if not isinstance(array, np.ndarray) or (array.shape, array.dtype) != (tuple(shape), dtype):
-            got = f"{array.shape} {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
-            raise ValueError(f"{name}: {key} must be {tuple(shape)} {dtype}, got {got}")
-        if key in ("actions", "rewards") and not np.isfinite(array).all():
-            raise ValueError(f"{name}: {key} must be finite")
-    over = episode["terminations"] | episode["truncations"]
-    if periods == 0 or over.sum() != 1 or not over[-1]:
-        raise ValueError(f"{name}: it must end once, with its last period")
-    return Demonstration(seed=seed, **{key: value for key, value in episode.items() if key != "id"})
+    """Check one flight against the spaces of its environment; ValueError if it does not fit."""
+    name = f"episode {episode['id']}"
+    flight = Demonstration(seed=seed, **{key: value for key, value in episode.items() if key != "id"})
+    ends, first = flight.terminations | flight.truncations, {key: seen[0] for key, seen in flight.observations.items()}
+    lengths = {len(seen) - 1 for seen in (*flight.observations.values(), *(flight.infos[key] for key in INFOS))}
+    lengths |= {len(flight.actions), len(flight.rewards), len(ends)}
+    if len(lengths) > 1 or ends.sum() != 1 or not ends[-1]:
+        raise ValueError(f"{name}: its arrays must be equally long, and it must end once, with its last period")
+    fits = first in env.observation_space and all(action in env.action_space for action in flight.actions)
+    if not fits or not np.isfinite(flight.rewards).all():
+        raise ValueError(f"{name} does not fit the spaces of {env.spec and env.spec.id}")
+    return flight

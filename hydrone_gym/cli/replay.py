@@ -108,8 +108,7 @@ class Replay(MissionOptions):
         for mission in self.prepare():
             recorder = tree_recorder(mission.policy)
             flight = fly(mission.env, recorder, seed=self.seed, scenario=mission.scenario)
-            title = f"{_spoken(mission.name)}, {self.policy}, seed {self.seed}"
-            takes.append(Take(mission.name, title, flight, mission.env.get_wrapper_attr("simulation"), recorder.trees))
+            takes.append(_take(mission.name, self.policy, self.seed, mission.env, flight, recorder.trees))
         return takes
 
     def _evaluated(self, folder: Path) -> Take:
@@ -153,25 +152,20 @@ class Replay(MissionOptions):
 
 
 def _restored(saved: SavedFlight) -> Take:
-    """Fly a saved flight again from its references, and its planner for the trees."""
+    """Fly a saved flight again from its references, and its planner for the trees.
+
+    There are none where the policy is not a registered one or flies otherwise now.
+    """
     env = gym.make("HydroneGym/Mission-v0", num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
-    simulation = env.get_wrapper_attr("simulation")
-    flight = restore(saved, simulation)
-    title = f"{_spoken(saved.name)}, {saved.policy}, seed {saved.seed}"
-    return Take(saved.name, title, flight, simulation, _trees(saved, env))
-
-
-def _trees(saved: SavedFlight, env: gym.Env) -> Sequence[Tree]:
-    """Return the trees of a saved flight, none where its policy is not a registered one or flies otherwise now."""
-    if saved.policy not in known_policies():
-        return ()
-    source = find_policy(saved.policy)
-    recorder = tree_recorder(source.make(env, saved.seed))
-    flight = fly(env, recorder, seed=saved.seed, scenario=saved.scenario)
-    if np.array_equal(flight.states, saved.states):
-        return recorder.trees
-    print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
-    return ()
+    flight, trees = restore(saved, env.get_wrapper_attr("simulation")), ()
+    if saved.policy in known_policies():
+        recorder = tree_recorder(find_policy(saved.policy).make(env, saved.seed))
+        again = fly(env, recorder, seed=saved.seed, scenario=saved.scenario)
+        if np.array_equal(again.states, saved.states):
+            trees = recorder.trees
+        else:
+            print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
+    return _take(saved.name, saved.policy, saved.seed, env, flight, trees)
 
 
 def tree_recorder(policy: Policy) -> Any:
@@ -180,8 +174,9 @@ def tree_recorder(policy: Policy) -> Any:
     return recorder.load()(policy)
 
 
-def _spoken(name: str) -> str:
-    return name[:1].upper() + name[1:].replace("-", " ")
+def _take(name: str, policy: str, seed: int, env: gym.Env, flight: Flight, trees: Sequence[Tree]) -> Take:
+    title = f"{name[:1].upper()}{name[1:].replace('-', ' ')}, {policy}, seed {seed}"
+    return Take(name, title, flight, env.get_wrapper_attr("simulation"), trees)
 
 
 def _described(take: Take, page: Path) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
 from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary
-from hydrone_gym.evaluation.tables import Table
+from hydrone_gym.evaluation.tables import Table, tables_of
 
 PAGE = "report.html"
 _TEMPLATE = Path(__file__).with_name("page.html")
@@ -126,20 +126,20 @@ def _worlds(suite: str, missions: Mapping[str, int]) -> str:
 
 def _suite_tables(stored: Stored, suite: str) -> str:
     """Return the tables of a suite: all missions together, then each, folded where they are many."""
-    within = [pair for pair in zip(stored.summaries, stored.tables, strict=True) if pair[0].suite == suite]
-    whole = [_tables(stored, *pair) for pair in within if pair[0].mission == ALL_MISSIONS]
-    each = [_tables(stored, *pair) for pair in within if pair[0].mission != ALL_MISSIONS]
+    within = [summary for summary in stored.summaries if summary.suite == suite]
+    whole = [_tables(stored, summary) for summary in within if summary.mission == ALL_MISSIONS]
+    each = [_tables(stored, summary) for summary in within if summary.mission != ALL_MISSIONS]
     text = _lines(each)
     if len(each) > _UNFOLDED:
         text = _folded(f"Tables of each of the {len(each)} missions", text)
     return f"<h3>{escape(suite)}</h3>\n{_lines([*whole, text])}"
 
 
-def _tables(stored: Stored, summary: MissionSummary, tables: Sequence[Table]) -> str:
+def _tables(stored: Stored, summary: MissionSummary) -> str:
     """Return the tables of a mission."""
     ranked, compared = [p.policy for p in summary.policies], [c.policy for c in summary.comparisons]
     names = [ranked, ranked, compared]  # as `tables_of` orders them
-    return _lines(_table(stored, table, rows) for table, rows in zip(tables, names, strict=False))
+    return _lines(_table(stored, table, rows) for table, rows in zip(tables_of([summary]), names, strict=False))
 
 
 def _table(stored: Stored, table: Table, policies: Sequence[str]) -> str:

@@ -2,12 +2,13 @@
 
 import contextlib
 import os
-import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from tqdm import tqdm
 
 from hydrone_gym.evaluation.backends import runner
 from hydrone_gym.evaluation.plan import BrokenOff, Plan, PoliciesLike, SuiteLike, fly_job, make_plan
@@ -108,12 +109,12 @@ def carry_out(
     plan.check()
     with (
         runner(backend, jobs) as run,
-        _bar(len(keys), len(records), progress) as advance,
+        tqdm(total=len(keys), initial=len(records), unit="flight", disable=None if progress else True) as bar,
         contextlib.closing(run(_calls(plan, len(records)))) as results,
     ):
         while len(records) < len(keys):
             broken = _take(results, records, folder, len(keys))
-            advance(len(records))
+            bar.update(len(records) - bar.n)
             if broken is not None:
                 suite, mission, world, policy = broken.key
                 where = f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}"
@@ -158,18 +159,3 @@ def _kept(records: list[Record], total: int, folder: RunFolder | None) -> str:
     """Say what was finished."""
     place = "" if folder is None else f" and kept in {folder.rows}; the same evaluation goes on from there"
     return f"{len(records)} of {total} flights are finished{place}"
-
-
-@contextlib.contextmanager
-def _bar(total: int, done: int, shown: bool) -> Iterator[Callable[[int], None]]:
-    """Show a bar on stderr where that is a terminal; yields a function that takes the number of finished flights."""
-    if not shown or not sys.stderr.isatty():
-        yield lambda finished: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = ("flights", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), "left", TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total, completed=done)
-        yield lambda finished: bar.update(task, completed=finished)

@@ -12,15 +12,14 @@ import json
 import os
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from hydrone_gym.evaluation.plan import Plan
 from hydrone_gym.evaluation.provenance import commit, machine, versions
 from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, read_records, to_line
 from hydrone_gym.evaluation.statistics import Estimate
-from hydrone_gym.evaluation.summary import Comparison, MissionSummary, PolicySummary, summarise
+from hydrone_gym.evaluation.summary import MissionSummary, summarise
 from hydrone_gym.evaluation.tables import Table, markdown, tables_of
 
 RUN, ROWS, SUMMARY, TABLES = "run.json", "rows.csv", "summary.json", "tables.md"
@@ -144,13 +143,11 @@ def _plain(value: Any) -> Any:
     return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stored:
+class Stored(NamedTuple):
     """What an evaluation left."""
 
     document: Mapping[str, Any]  # the summary as plain data
-    summaries: Sequence[MissionSummary]  # its missions
-    tables: Sequence[Sequence[Table]]  # those of each summary
+    summaries: Sequence[MissionSummary]
     records: Sequence[Record]  # the rows, at least one
 
     @property
@@ -179,17 +176,17 @@ def read_stored(folder: Path) -> Stored:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         _check(document)
-        summaries = [_summary(entry) for entry in document["missions"]]
-        tables = [tables_of([summary]) for summary in summaries]
+        arguments = document["arguments"]
+        summed = [(m["suite"], m["mission"], *sorted(p["policy"] for p in m["policies"])) for m in document["missions"]]
+        summaries = summarise(records, arguments["baseline"]) if records else []
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: damaged: {type(error).__name__}: {error}") from None
-    arguments = document["arguments"]
-    summed = {(summary.suite, entry.policy) for summary in summaries for entry in summary.policies}
-    known = {(suite, policy) for suite in arguments["suites"] for policy in arguments["policies"]}
-    flown = {(record.suite, record.policy) for record in records}
-    if document["rows"] != len(records) or summed != flown or not summed <= known:
+    found = [(m.suite, m.mission, *sorted(p.policy for p in m.policies)) for m in summaries]
+    asked = set(arguments["suites"]), set(arguments["policies"])
+    flown = {record.suite for record in records}, {record.policy for record in records}
+    if document["rows"] != len(records) or summed != found or not (flown[0] <= asked[0] and flown[1] <= asked[1]):
         raise ValueError(f"{folder}: {SUMMARY} does not sum up {ROWS}: run the evaluation once more")
-    return Stored(document=document, summaries=summaries, tables=tables, records=records)
+    return Stored(document, summaries, records)
 
 
 def _check(document: Mapping[str, Any]) -> None:
@@ -204,17 +201,6 @@ def _check(document: Mapping[str, Any]) -> None:
     for name in _MAPPINGS:
         if not isinstance(parts[name], dict):
             raise ValueError(f"{name} must be a dict, got {type(parts[name]).__name__}")
-
-
-def _summary(entry: Mapping[str, Any]) -> MissionSummary:
-    """Turn one mission of a document back into what it was written from."""
-
-    def read(values: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: Estimate(**value) if isinstance(value, dict) else value for name, value in values.items()}
-
-    policies = tuple(PolicySummary(**read(values)) for values in entry["policies"])
-    comparisons = tuple(Comparison(**read(values)) for values in entry["comparisons"])
-    return MissionSummary(**{**entry, "policies": policies, "comparisons": comparisons})
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

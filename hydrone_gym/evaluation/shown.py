@@ -1,35 +1,20 @@
 """The flights that show a policy, its best, its median and its worst one: which they are, and flying them again."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.plan import Plan
 from hydrone_gym.evaluation.records import Record, record_of
-from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import Simulation
 
 REPLAYS = "replays"  # folder beside the page
-# from the least bad end to the worst
-_ENDS = (
-    Outcome.GOAL,
-    Outcome.TIMEOUT,
-    Outcome.OUT_OF_BOUNDS,
-    Outcome.DIVERGED,
-    Outcome.ROUGH_TRANSITION,
-    Outcome.COLLISION,
-)
-_RANK = {outcome.name: rank for rank, outcome in enumerate(_ENDS)}
-
-
-class Writer(Protocol):
-    """Writes the replay of a flight, as `rendering.replay.write_replay` does."""
-
-    def __call__(self, flight: Flight, simulation: Simulation, path: Path, /, *, title: str) -> object:
-        """Write a page with this title to a path in an existing folder."""
+_ENDS = ("GOAL", "TIMEOUT", "OUT_OF_BOUNDS", "DIVERGED", "ROUGH_TRANSITION", "COLLISION")  # from best to worst
+Writer = Callable[
+    ..., object
+]  # (flight, simulation, path, *, title): writes a page, as `rendering.replay.write_replay`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,8 +24,7 @@ class Shown:
     policy: str  # its name
     best: Record  # arrived soonest
     median: Record  # in the middle, by time, of those that arrived
-    # the soonest collision; without collisions the soonest rough crossing, and so on down to timeouts; the slowest
-    # flight where all arrived
+    # the soonest collision; without one the soonest rough crossing, and so on; the slowest flight where all arrived
     worst: Record
 
 
@@ -56,7 +40,7 @@ def shown_flights(records: Sequence[Record]) -> list[Shown]:
 
 
 def _badness(record: Record) -> tuple[int, float]:
-    return _RANK[record.outcome], record.time if record.success else -record.time
+    return _ENDS.index(record.outcome), record.time if record.success else -record.time
 
 
 def write_replays(shown: Sequence[Shown], plan: Plan, folder: Path, write: Writer) -> dict[Record, tuple[Path, Record]]:
