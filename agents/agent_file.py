@@ -72,15 +72,13 @@ def read_agent(folder: Path) -> AgentFile:
     Raises FileNotFoundError if there is none, ValueError naming the file for one that is foreign, damaged, of another
     format version, or trained for an environment or an observation that this package does not have.
     """
-    import yaml
-
     text = folder if folder.suffix in (".yaml", ".yml") else folder / TEXT
     if not text.is_file():
         raise FileNotFoundError(f"no agent at {folder}: {text} does not exist")
+    content = read_yaml(text)
     try:
-        content = _checked(yaml.safe_load(text.read_text(encoding="utf-8")))
-        network = _network(content, text.parent)
-    except (ValueError, yaml.YAMLError) as error:
+        network = _network(_checked(content), text.parent)
+    except ValueError as error:
         raise ValueError(f"{text}: {error}") from None
     return AgentFile(
         name=str(content["name"]),
@@ -89,6 +87,16 @@ def read_agent(folder: Path) -> AgentFile:
         network=network,
         notes=content.get("notes") or {},
     )
+
+
+def read_yaml(file: Path) -> Any:
+    """Return plain data from a YAML file, nothing else; ValueError in one line, naming the file."""
+    import yaml
+
+    try:
+        return yaml.safe_load(file.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file}: no YAML: {' '.join(str(error).split())}") from None
 
 
 def _checked(content: Any) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import torch
 import yaml
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.agent_file import save_agent
+from agents.agent_file import read_yaml, save_agent
 from agents.algorithms import ALGORITHMS, export_agent
 from agents.checkpoint import MODEL, checkpoints, load_checkpoint
 from agents.mission_mix import MissionMix
@@ -103,7 +103,7 @@ def resume(folder: Path, *, progress: bool = True) -> Flown:
     """
     if not (folder / CONFIG).is_file():
         raise FileNotFoundError(f"no training run at {folder}: {folder / CONFIG} does not exist")
-    content = yaml.safe_load((folder / CONFIG).read_text(encoding="utf-8"))
+    content = read_yaml(folder / CONFIG)
     recipe = Recipe(**content["recipe"])
     paths = {name: content["run"][name] and Path(content["run"][name]) for name in ("recipe", "start_from")}
     run = TrainingRun(**{**content["run"], **paths, "folder": folder, "progress": progress})

@@ -55,14 +55,8 @@ def fly_failed(
 ) -> FailedFlight:
     """Fly a failed flight once more, alone, and look at every decision.
 
-    Args:
-        env, policy: new ones, as they flew in the batch.
-        scenario: the world.
-        mission, seed: where that is from, for the record.
-        outcome: name of the outcome in the batch.
-
-    Raises:
-        ValueError: the flight ends otherwise now, because the policy chooses differently alone than in a batch.
+    `mission` and `seed` say where the world is from; `outcome` is the name of that in the batch. Raises ValueError if
+    the flight ends otherwise now, because the policy chooses differently alone than in a batch.
     """
     recorder = DecisionRecorder(policy)
     flight = fly(env, recorder, scenario=scenario)

@@ -22,14 +22,10 @@ from hydrone_gym.rendering.style import DOTS_PER_INCH
 
 
 def find_failures(plan: Plan, *, progress: bool = False) -> tuple[list[Record], list[Failure]]:
-    """Fly a policy in held-out worlds, and those where it failed once more, singly.
-
-    Args:
-        plan: of `Suite.held_out` worlds, and one policy.
-        progress: show bars on stderr.
+    """Fly a plan of `Suite.held_out` worlds and one policy, and those flights that failed once more, singly.
 
     Returns:
-        The records of all flights, and the failures in the same order.
+        The records of all flights, and the failures in the same order; bars on stderr show the `progress`.
 
     Raises:
         EvaluationStopped: the policy raised.
@@ -50,14 +46,8 @@ def write_failure_report(
 ) -> tuple[str, dict[str, Any]]:
     """Fly held-out worlds and write tables, `failures.csv` and figures; return the tables and the same as plain data.
 
-    Args:
-        policy: as `find_policy` takes it.
-        folder: made if missing.
-        worlds: a mission.
-        options: keyword options of the environments, among them "vehicle" by its name.
-        progress: show bars on stderr.
-
-    Raises what `find_failures` and `make_plan` do.
+    Arguments are those of `evaluate_held_out`; the folder is made if missing. Raises what `find_failures` and
+    `make_plan` do.
     """
     others = {name: value for name, value in options.items() if name != "vehicle"}
     plan = make_plan(Suite.held_out(worlds, others), policy, worlds=worlds, vehicle=options["vehicle"])
@@ -69,12 +59,8 @@ def write_failure_report(
     for mission in plan.suites[0].missions:
         arrived = np.array([record.success for record in records if record.mission == mission.name])
         seen.append((mission.env_id, features_of(mission.scenarios, reach), arrived))
-    figures = {
-        "where": draw_where(failures, MISSIONS, env.world),
-        "how": draw_how(failures),
-        "worlds": draw_worlds(seen),
-    }
-    for name, figure in figures.items():
+    drawn = (draw_where(failures, MISSIONS, env.world), draw_how(failures), draw_worlds(seen))
+    for name, figure in zip(("where", "how", "worlds"), drawn, strict=True):
         figure.savefig(folder / f"failures-{name}.png", dpi=DOTS_PER_INCH)
     write_failures(failures, folder / "failures.csv")
     outcomes = [table for table in tables_of(summarise(records)) if table.title.endswith("outcomes")]

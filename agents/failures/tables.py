@@ -32,10 +32,7 @@ def _line(failure: Failure) -> list[object]:
 def failure_tables(failures: Sequence[Failure], missions: Sequence[str], worlds: int) -> str:
     """Return Markdown tables: causes and parts of the flight by mission, and the typical numbers of each cause.
 
-    Args:
-        failures: of all missions.
-        missions: environment ids, in the order of the columns.
-        worlds: flown in each.
+    `missions` are the environment ids in the order of the columns, `worlds` how many were flown in each.
     """
     parts = [_counts("cause", CAUSES, lambda failure: failure.cause, failures, missions, worlds)]
     if failures:

@@ -10,11 +10,8 @@ from hydrone_gym.simulation.simulation import Simulation
 def draw_flight(flight: Flight, simulation: Simulation, directory: Path, name: str) -> list[Path]:
     """Write the figures of a flight, path, position and attitude, as PNG and PDF; return their paths.
 
-    Args:
-        flight: the flight.
-        simulation: that of the environment it was flown in.
-        directory: an existing folder.
-        name: begins every file's name, and with a capital letter every title.
+    `simulation` is that of the environment it was flown in; `name` begins the name of every file in the existing
+    `directory`, and with a capital letter every title.
     """
     from hydrone_gym.rendering.figures import plot_path, save_figure
     from hydrone_gym.rendering.histories import plot_attitude, plot_position

@@ -101,18 +101,10 @@ def _compare(run: Path, arguments: dict[str, Any]) -> None:
 def write_results(
     plan: Plan, records: Sequence[Record], folder: Path, *, baseline: str | None = None, seconds: float | None = None
 ) -> tuple[dict[str, Any], list[Table]]:
-    """Sum up the records of a plan, write `summary.json` and `tables.md`, and return what they hold.
+    """Sum up the records of a plan, at least one, write `summary.json` and `tables.md`, and return what they hold.
 
-    Args:
-        plan: what was flown.
-        records: the rows, at least one.
-        folder: where the rows are.
-        baseline: see `summarise`.
-        seconds: wall-clock time that this run took, s.
-
-    Raises:
-        OSError: files that cannot be written.
-        ValueError: a baseline that is not among the policies.
+    `seconds` is the wall-clock time that this run took, s. Raises OSError for files that cannot be written, and what
+    `summarise` raises.
     """
     summaries = summarise(records, baseline)
     document = {

@@ -44,13 +44,7 @@ def _badness(record: Record) -> tuple[int, float]:
 
 
 def write_replays(shown: Sequence[Shown], plan: Plan, folder: Path, write: Writer) -> dict[Record, tuple[Path, Record]]:
-    """Fly the flights again and write a replay of each into a folder, which is made if missing.
-
-    Args:
-        shown: what to fly.
-        plan: where its worlds and policies are found.
-        folder: to write to.
-        write: writes one.
+    """Fly flights of a plan again and write a replay of each into a folder, which is made if missing.
 
     Returns:
         For each record the file, and the record of the flight in it: another one for a policy that draws at random or
