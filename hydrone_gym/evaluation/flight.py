@@ -88,15 +88,14 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         references.append(observation["reference"])
         rewards.append(float(reward))
         start, done = np.array([False]), terminated or truncated
-    sent = np.array(references)
-    trace = _trace(world, states[0], sent)
+    trace = _trace(world, states[0], np.array(references))
     return Flight(
         obstacles=len(world.scenario.obstacles),
         scenario=world.scenario,
         **{key: info[key] for key in _TOLD},
         length=float(np.linalg.norm(np.diff(trace.states[:, :3], axis=0), axis=1).sum()),
         episode_return=sum(rewards),
-        references=sent,
+        references=np.array(references),
         states=np.array(states),
         detected=observation["obstacles"][observation["obstacles"][:, 3] > 0.0],
         decision_ms=np.array(decisions),
@@ -120,9 +119,6 @@ def fly_worlds(
         How the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
     """
     observation, _ = env.reset(seed=seed, options=None if scenarios is None else {"scenario": list(scenarios)})
-    spheres = [observation["obstacles"].shape[1]] * env.num_envs
-    if scenarios is not None:
-        spheres = [len(scenario.obstacles) for scenario in scenarios]
     running, memory, starts = np.arange(env.num_envs), None, np.ones(env.num_envs, bool)
     returns, shares, endings = np.zeros(env.num_envs), [], {}
     while len(running):
@@ -139,7 +135,7 @@ def fly_worlds(
             told = {key: info[key][row] for key in _TOLD}
             endings[row] = Ending(
                 **{**told, "outcome": Outcome(told["outcome"])},
-                obstacles=spheres[row],
+                obstacles=observation["obstacles"].shape[1] if scenarios is None else len(scenarios[row].obstacles),
                 length=None,
                 episode_return=float(returns[row]),
                 decision_ms=np.array(shares),

@@ -4,8 +4,7 @@ import html
 import math
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,26 +24,15 @@ _BOX = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Group:
+class Group(NamedTuple):
     """Flights that are drawn together: those of a mission, or of all missions of a suite."""
 
     title: str
     summary: MissionSummary
     records: Sequence[Record]
 
-    def values(self, policies: Sequence[str], name: str, *, arrived: bool = False) -> dict[str, list[float]]:
-        """Return a column for each policy, without empty cells; `arrived` leaves out flights that did not."""
-        columns: dict[str, list[float]] = {policy: [] for policy in policies}
-        for record in self.records:
-            value = getattr(record, name)
-            if value is not None and (record.success or not arrived):
-                columns[record.policy].append(value)
-        return columns
 
-
-@dataclass(frozen=True, kw_only=True)
-class Chart:
+class Chart(NamedTuple):
     """A heading, a caption, panels, and panels that are folded away."""
 
     name: str
@@ -52,6 +40,16 @@ class Chart:
     caption: str
     panels: Sequence[str]
     folded: Sequence[str] = ()
+
+
+class Column(NamedTuple):
+    """A column of the rows whose distribution is drawn."""
+
+    name: str
+    label: str
+    scale: float = 1.0
+    limit: float | None = None
+    limit_label: str = ""
 
 
 def groups_of(records: Sequence[Record], summaries: Sequence[MissionSummary]) -> list[Group]:
@@ -79,15 +77,58 @@ def main_groups(groups: Sequence[Group]) -> list[Group]:
 def charts_of(records: Sequence[Record], groups: Sequence[Group]) -> list[Chart]:
     """Draw all figures; those for which there is nothing to draw are left out."""
     policies = list(dict.fromkeys(record.policy for record in records))
+    rough = World().rough_speed
+    costs = (Column("time", "time to the goal (s)"), Column("energy", "energy of the rotors (kJ)", 1e-3))
+    distance = Column("clearance", "least distance to an obstacle (m)", limit=0.0, limit_label="contact")
+    lateral = Column("lateral_speed", "lateral speed (m/s)", limit=rough, limit_label=f"rough above {rough:g}")
+    crossings = (lateral, Column("vertical_speed", "vertical speed (m/s)"))
     charts = [
         _success(policies, groups),
-        _measures(policies, main_groups(groups)),
+        Chart(
+            "time-and-energy",
+            "Time and energy",
+            f"Over the flights that arrived, n of them. {_BOX} A policy that arrives only in easy worlds looks "
+            "quick here; the tables of differences compare equal worlds.",
+            _boxes(groups, policies, costs, arrived=True),
+        ),
         _density(policies, groups),
-        _clearance(policies, main_groups(groups)),
-        _crossings(policies, main_groups(groups)),
+        Chart(
+            "clearance",
+            "Clearance",
+            "Least distance between the sphere around the vehicle and an obstacle, over all n flights in "
+            f"worlds with obstacles. Below zero they touched. {_BOX}",
+            _boxes(groups, policies, (distance,)),
+        ),
+        Chart(
+            "crossings",
+            "Speed at the crossing",
+            "Largest lateral and vertical speed of a flight at its crossings of the surface, over all n flights "
+            f"that crossed. A crossing is rough above {rough:g} m/s laterally. {_BOX}",
+            _boxes(groups, policies, crossings),
+        ),
         _decisions(policies, records),
     ]
     return [chart for chart in charts if chart.panels]
+
+
+def _boxes(
+    groups: Sequence[Group], policies: Sequence[str], columns: Sequence[Column], *, arrived: bool = False
+) -> list[str]:
+    """Draw the distributions of columns, a panel a group and column; `arrived` leaves out flights that did not."""
+    from hydrone_gym.rendering.comparison import plot_distributions
+
+    panels = []
+    for group in main_groups(groups):
+        for name, label, scale, limit, limit_label in columns:
+            values: dict[str, list[float]] = {policy: [] for policy in policies}
+            for record in group.records:
+                value = getattr(record, name)
+                if value is not None and (record.success or not arrived):
+                    values[record.policy].append(scale * value)
+            if any(values.values()):
+                figure = plot_distributions(values, label, title=group.title, limit=limit, limit_label=limit_label)
+                panels.append(_image(figure, f"{label[:1].upper()}{label[1:]}: {group.title}"))
+    return panels
 
 
 def _success(policies: Sequence[str], groups: Sequence[Group]) -> Chart:
@@ -106,22 +147,6 @@ def _success(policies: Sequence[str], groups: Sequence[Group]) -> Chart:
         caption="Share of all flights that arrived, with the 95 % Wilson interval.",
         panels=[panel(group) for group in shown],
         folded=[panel(group) for group in rest],
-    )
-
-
-def _measures(policies: Sequence[str], groups: Sequence[Group]) -> Chart:
-    measures = (("time", "time to the goal (s)", 1.0), ("energy", "energy of the rotors (kJ)", 1e-3))
-    return Chart(
-        name="time-and-energy",
-        heading="Time and energy",
-        caption=f"Over the flights that arrived, n of them. {_BOX} A policy that arrives only in easy worlds looks "
-        "quick here; the tables of differences compare equal worlds.",
-        panels=[
-            _boxes(group, policies, *measure, arrived=True)
-            for group in groups
-            if any(record.success for record in group.records)
-            for measure in measures
-        ],
     )
 
 
@@ -153,41 +178,6 @@ def _rate(records: Sequence[Record], policy: str, count: int) -> tuple[float, fl
     return (sum(ends) / len(ends), *wilson_interval(sum(ends), len(ends)))
 
 
-def _clearance(policies: Sequence[str], groups: Sequence[Group]) -> Chart:
-    label = "least distance to an obstacle (m)"
-    return Chart(
-        name="clearance",
-        heading="Clearance",
-        caption="Least distance between the sphere around the vehicle and an obstacle, over all n flights in "
-        f"worlds with obstacles. Below zero they touched. {_BOX}",
-        panels=[
-            _boxes(group, policies, "clearance", label, limit=0.0, limit_label="contact")
-            for group in groups
-            if any(record.clearance is not None for record in group.records)
-        ],
-    )
-
-
-def _crossings(policies: Sequence[str], groups: Sequence[Group]) -> Chart:
-    rough = World().rough_speed
-    crossing = [group for group in groups if any(record.crossings for record in group.records)]
-    limit = f"rough above {rough:g}"
-    return Chart(
-        name="crossings",
-        heading="Speed at the crossing",
-        caption="Largest lateral and vertical speed of a flight at its crossings of the surface, over all n flights "
-        f"that crossed. A crossing is rough above {rough:g} m/s laterally. {_BOX}",
-        panels=[
-            panel
-            for group in crossing
-            for panel in (
-                _boxes(group, policies, "lateral_speed", "lateral speed (m/s)", limit=rough, limit_label=limit),
-                _boxes(group, policies, "vertical_speed", "vertical speed (m/s)"),
-            )
-        ],
-    )
-
-
 def _decisions(policies: Sequence[str], records: Sequence[Record]) -> Chart:
     from hydrone_gym.rendering.comparison import plot_decisions
 
@@ -203,26 +193,6 @@ def _decisions(policies: Sequence[str], records: Sequence[Record]) -> Chart:
         "50th and 99th percentile.",
         panels=[_image(plot_decisions(times, title=title), "Times of decisions")],
     )
-
-
-def _boxes(
-    group: Group,
-    policies: Sequence[str],
-    name: str,
-    label: str,
-    scale: float = 1.0,
-    *,
-    arrived: bool = False,
-    limit: float | None = None,
-    limit_label: str = "",
-) -> str:
-    """Draw the distributions of one column of a group."""
-    from hydrone_gym.rendering.comparison import plot_distributions
-
-    columns = group.values(policies, name, arrived=arrived)
-    values = {policy: scale * np.array(column) for policy, column in columns.items()}
-    figure = plot_distributions(values, label, title=group.title, limit=limit, limit_label=limit_label)
-    return _image(figure, f"{label[:1].upper()}{label[1:]}: {group.title}")
 
 
 def _image(figure: "Figure", words: str) -> str:

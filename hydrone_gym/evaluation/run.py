@@ -53,9 +53,8 @@ def evaluate(
         jobs: flights at once.
         backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
             this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
-        out: folder to write rows to as they are finished, and `summary.json` and `tables.md` at the end, ready for
-            `hydrone_gym.evaluation.page.write_report`; an evaluation with the same arguments that was stopped there
-            goes on where it was.
+        out: folder for rows, written as they are finished, and results, ready for `page.write_report`; an evaluation
+            with the same arguments that was stopped there goes on where it was.
 
     Raises:
         ValueError, TypeError, FileNotFoundError: an argument out of range, an unknown suite or policy, a folder with
