@@ -12,13 +12,14 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-from hydrone_gym.evaluation.page_figures import SEVERAL, Chart, charts_of, groups_of
+from hydrone_gym.evaluation.page_figures import SEVERAL, Chart, charts_of
 from hydrone_gym.evaluation.plan import Plan, plan_of
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
 from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary
-from hydrone_gym.evaluation.tables import Table, tables_of
+from hydrone_gym.evaluation.tables import tables_of
+from hydrone_gym.rendering.comparison import colour
 
 PAGE = "report.html"
 _TEMPLATE = Path(__file__).with_name("page.html")
@@ -28,7 +29,7 @@ _FILES = {
     SUMMARY: "the statistics, arguments, versions, commit and machine",
     TABLES: "the tables as Markdown",
 }
-Flown = Mapping[Record, tuple[Path, Record]]
+Written = Mapping[Record, tuple[Path, Record]]
 
 
 def write_report(
@@ -63,30 +64,28 @@ def write_report(
         for name in _FILES:
             if (source / name).exists():
                 shutil.copyfile(source / name, target / name)
-    flown: Flown = {}
+    flown: Written = {}
     if replay is not None:
         flown = write_replays(shown, plan or plan_of(stored.arguments), target / REPLAYS, replay)
-    page = target / PAGE
-    write_whole(page, _page(stored, shown, flown, target))
-    return page
+    write_whole(target / PAGE, _page(stored, shown, flown, target))
+    return target / PAGE
 
 
-def _page(stored: Stored, shown: Sequence[Shown], flown: Flown, folder: Path) -> str:
+def _page(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> str:
     """Fill the template."""
     suites = list(stored.arguments["suites"])
     several = f"{len(stored.policies)} policies" if len(stored.policies) > 1 else stored.policies[0]
     worlds = len({record.key[:3] for record in stored.records})
     vehicle = stored.arguments["vehicle"]
     lead = f"{len(stored.records):,} flights in {worlds:,} worlds, the vehicle with its {vehicle} parameters."
-    charts = charts_of(stored.records, groups_of(stored.records, stored.summaries))
     files = [f"<li>{_link(name, name)}: {words}</li>" for name, words in _FILES.items() if (folder / name).exists()]
     versions = stored.document["versions"]
     return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
         title=escape(f"{several} on {_listed(suites)}"),
         lead=escape(lead),
         about=_about(stored),
-        tables="\n".join(_suite_tables(stored, suite) for suite in suites),
-        figures="\n".join(map(_chart, charts)),
+        tables=_lines(_suite_tables(stored, suite) for suite in suites),
+        figures=_lines(map(_chart, charts_of(stored.records, stored.summaries))),
         replays=_replays(stored, shown, flown, folder),
         files=f"<ul>\n{_lines(files)}\n</ul>",
         footer=escape(f"Written by hydrone_gym {versions.get('hydrone-gym', '')}, {stored.document['date']}."),
@@ -99,21 +98,20 @@ def _about(stored: Stored) -> str:
     planned = len(arguments["policies"]) * sum(sum(worlds.values()) for worlds in arguments["worlds"].values())
     finished = "" if document["complete"] else f" of {planned:,}: the evaluation was stopped before its end"
     machine = document["machine"]
+    names = (f'<span class="name">{_spot(stored, name)}{escape(name)}</span>' for name in stored.policies)
     facts = {
-        "Policies": " ".join(f'<span class="name">{_named(stored, policy)}</span>' for policy in stored.policies),
-        "Baseline": escape(arguments["baseline"]),
-        "Worlds": "<br>".join(escape(_worlds(name, worlds)) for name, worlds in arguments["worlds"].items()),
-        "Flights": escape(f"{len(stored.records):,}{finished}"),
-        "Vehicle": escape(f"{arguments['vehicle']} parameters"),
-        "Seed": escape(str(arguments["seed"])),
-        "Date": escape(document["date"]),
-        "Commit": f"<code>{escape(document['commit'] or 'none: an installed copy')}</code>",
-        "Machine": escape(
-            ", ".join(f"{value} cores" if key == "cores" else str(value) for key, value in machine.items())
-        ),
-        "Versions": escape(", ".join(f"{name} {version}" for name, version in document["versions"].items())),
+        "Baseline": arguments["baseline"],
+        "Worlds": "\n".join(_worlds(name, worlds) for name, worlds in arguments["worlds"].items()),
+        "Flights": f"{len(stored.records):,}{finished}",
+        "Vehicle": f"{arguments['vehicle']} parameters",
+        "Seed": str(arguments["seed"]),
+        "Date": document["date"],
+        "Commit": document["commit"] or "none: an installed copy",
+        "Machine": ", ".join(f"{value} cores" if key == "cores" else str(value) for key, value in machine.items()),
+        "Versions": ", ".join(f"{name} {version}" for name, version in document["versions"].items()),
     }
-    return "<dl>\n" + _lines(f"<dt>{name}</dt><dd>{words}</dd>" for name, words in facts.items()) + "\n</dl>"
+    shown = {"Policies": " ".join(names)} | {name: escape(text).replace("\n", "<br>") for name, text in facts.items()}
+    return "<dl>\n" + _lines(f"<dt>{name}</dt><dd>{words}</dd>" for name, words in shown.items()) + "\n</dl>"
 
 
 def _worlds(suite: str, missions: Mapping[str, int]) -> str:
@@ -129,30 +127,23 @@ def _suite_tables(stored: Stored, suite: str) -> str:
     within = [summary for summary in stored.summaries if summary.suite == suite]
     whole = [_tables(stored, summary) for summary in within if summary.mission == ALL_MISSIONS]
     each = [_tables(stored, summary) for summary in within if summary.mission != ALL_MISSIONS]
-    text = _lines(each)
     if len(each) > _UNFOLDED:
-        text = _folded(f"Tables of each of the {len(each)} missions", text)
-    return f"<h3>{escape(suite)}</h3>\n{_lines([*whole, text])}"
+        each = [_folded(f"Tables of each of the {len(each)} missions", _lines(each))]
+    return f"<h3>{escape(suite)}</h3>\n{_lines([*whole, *each])}"
 
 
 def _tables(stored: Stored, summary: MissionSummary) -> str:
     """Return the tables of a mission."""
     ranked, compared = [p.policy for p in summary.policies], [c.policy for c in summary.comparisons]
-    names = [ranked, ranked, compared]  # as `tables_of` orders them
-    return _lines(_table(stored, table, rows) for table, rows in zip(tables_of([summary]), names, strict=False))
-
-
-def _table(stored: Stored, table: Table, policies: Sequence[str]) -> str:
-    """Return a table; `policies` are those of its rows."""
-    rows = []
-    for policy, (first, *cells) in zip(policies, table.rows, strict=True):
-        figures = "".join(f"<td>{_figure(cell)}</td>" for cell in cells)
-        rows.append(f'<tr><th scope="row">{_named(stored, policy, first)}</th>{figures}</tr>')
-    return _scrolled("", table.title, _heads(table.heads), rows)
-
-
-def _heads(names: Iterable[str]) -> str:
-    return "".join(f'<th scope="col">{escape(name).replace(chr(10), "<br>")}</th>' for name in names)
+    shown = []
+    tables = tables_of([summary])
+    for table, policies in zip(tables, (ranked, ranked, compared), strict=False):  # as `tables_of` orders them
+        rows = [
+            f"<tr>{_named(stored, policy, first)}{''.join(f'<td>{_figure(cell)}</td>' for cell in cells)}</tr>"
+            for policy, (first, *cells) in zip(policies, table.rows, strict=True)
+        ]
+        shown.append(_scrolled("", table.title, table.heads, rows))
+    return _lines(shown)
 
 
 def _figure(cell: str) -> str:
@@ -161,39 +152,39 @@ def _figure(cell: str) -> str:
     return f"{value} <small>[{interval}</small>" if bracket else value
 
 
-def _scrolled(kind: str, title: str, heads: str, rows: Iterable[str]) -> str:
-    """Return a table in a box that scrolls where the window is narrow; all but `title` is HTML."""
+def _scrolled(kind: str, title: str, heads: Iterable[str], rows: Iterable[str]) -> str:
+    """Return a table in a box that scrolls where the window is narrow; `kind` and `rows` are HTML."""
+    columns = "".join(f'<th scope="col">{escape(name).replace(chr(10), "<br>")}</th>' for name in heads)
     return (
         f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(title)}"><table{kind}>\n'
-        f"<caption><span>{escape(title)}</span></caption>\n<thead><tr>{heads}</tr></thead>\n"
+        f"<caption><span>{escape(title)}</span></caption>\n<thead><tr>{columns}</tr></thead>\n"
         f"<tbody>\n{_lines(rows)}\n</tbody>\n</table></div>"
     )
 
 
 def _chart(chart: Chart) -> str:
     """Return a chart: heading, caption, panels, and the folded ones."""
-    panels = f'<div class="panels">\n{_lines(chart.panels)}\n</div>'
-    folded = ""
+    name = chart.heading.lower().replace(" ", "-")
+    panels, folded = (f'<div class="panels">\n{_lines(part)}\n</div>' for part in (chart.panels, chart.folded))
     if chart.folded:
-        inside = f'<div class="panels">\n{_lines(chart.folded)}\n</div>'
-        folded = _folded(f"Each of {len(chart.folded)} missions", inside)
+        panels += "\n" + _folded(f"Each of {len(chart.folded)} missions", folded)
     caption = f"<figcaption>{escape(chart.caption)}</figcaption>"
-    return f'<h3 id="{chart.name}">{escape(chart.heading)}</h3>\n<figure>\n{caption}\n{panels}\n{folded}</figure>'
+    return f'<h3 id="{name}">{escape(chart.heading)}</h3>\n<figure>\n{caption}\n{panels}\n</figure>'
 
 
-def _replays(stored: Stored, shown: Sequence[Shown], flown: Flown, folder: Path) -> str:
+def _replays(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> str:
     """Return the table of the flights that show each policy, with links or with how to fly them."""
-    heads = _heads(("policy", "best", "median", "worst"))
     rows = []
     for entry in shown:
         flights = (entry.best, entry.median, entry.worst)
         cells = "".join(f"<td>{_flight(record, flown.get(record), folder)}</td>" for record in flights)
-        rows.append(f'<tr><th scope="row">{_named(stored, entry.policy)}</th>{cells}</tr>')
+        rows.append(f"<tr>{_named(stored, entry.policy)}{cells}</tr>")
     chosen = (
         "<p>Best arrived soonest, median is in the middle by time of those that arrived. Worst is the soonest "
         "collision; without one the soonest rough crossing, then any other failure, then the slowest flight. "
         "Worlds count from 0.</p>"
     )
+    heads = ("policy", "best", "median", "worst")
     table = _scrolled(' class="words"', "Flights that show each policy", heads, rows)
     return "\n".join([chosen, table, "" if flown else _recipe(shown[0].worst)])
 
@@ -224,12 +215,14 @@ def _recipe(record: Record) -> str:
     )
 
 
-def _named(stored: Stored, policy: str, text: str = "") -> str:
-    """Return the name of a policy, or another text, behind a spot of the colour it has in the figures."""
-    from hydrone_gym.rendering.comparison import colour
+def _spot(stored: Stored, policy: str) -> str:
+    """Return a spot of the colour that a policy has in the figures."""
+    return f'<span class="swatch" style="background:{colour(stored.policies.index(policy))}"></span>'
 
-    spot = f'<span class="swatch" style="background:{colour(stored.policies.index(policy))}"></span>'
-    return f"{spot}{escape(text or policy)}"
+
+def _named(stored: Stored, policy: str, text: str = "") -> str:
+    """Return the head of a row: the name of a policy, or another text, behind its spot."""
+    return f'<th scope="row">{_spot(stored, policy)}{escape(text or policy)}</th>'
 
 
 def _link(path: str, text: str) -> str:

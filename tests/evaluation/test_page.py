@@ -11,11 +11,13 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
+from hydrone_gym.evaluation import page_figures
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import PolicySource
 from hydrone_gym.evaluation.records import HEADER, read_records, to_line
 from hydrone_gym.evaluation.run_folder import write_results
+from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.evaluation.suites import Mission, Suite
 from hydrone_gym.evaluation.summary import summarise
 from hydrone_gym.evaluation.tables import tables_of
@@ -168,6 +170,19 @@ def test_figures_are_there_for_what_there_is(page):
         assert len([1 for word in words if word[0] == kind]) == 3
     for kind in ("Least distance to an obstacle (m)", "Lateral speed (m/s)", "Vertical speed (m/s)"):
         assert [place.strip() for word, _, place in words if word == kind] == ["mine, few", "mine, many"]
+
+
+def test_success_against_density_counts_every_flight_once(monkeypatch):
+    drawn = []
+    plot = page_figures.plot_density
+    monkeypatch.setattr(
+        page_figures, "plot_density", lambda *args, **kwargs: drawn.append(args) or plot(*args, **kwargs)
+    )
+    records = list(made_records(made_plan()))
+    page_figures.charts_of(records, summarise(records, "good"))
+    ((counts, rates),) = drawn
+    assert counts == [5, 30]
+    np.testing.assert_allclose(rates["good"], [(1.0, *wilson_interval(WORLDS, WORLDS))] * 2)
 
 
 def test_names_do_no_harm(folder, page):
