@@ -30,16 +30,12 @@ class FailedFlight:
 
 
 class DecisionRecorder:
-    """Wraps a policy for one flight and keeps what it saw and chose; actions and memory stay as they are.
-
-    Attributes:
-        seen: (observation, action), one entry a decision.
-    """
+    """Wraps a policy for one flight and keeps what it saw and chose; actions and memory stay as they are."""
 
     def __init__(self, policy: Policy) -> None:
         """Begin without decisions."""
         self.policy = policy
-        self.seen: list[tuple[Mapping[str, NDArray], NDArray]] = []
+        self.seen: list[tuple[Mapping[str, NDArray], NDArray]] = []  # observation and action, a decision each
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False

@@ -19,6 +19,7 @@ from typing import Any
 from gymnasium.error import DependencyNotInstalled
 
 from hydrone_gym.cli.compiling import tell_compiling
+from hydrone_gym.evaluation.run import EvaluationStopped
 
 GROUP = "hydrone_gym.commands"
 MOST_OBSTACLES = 1000  # of an option; more take minutes to place
@@ -43,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ImportError as error:
         extra = getattr(kind, "EXTRA", "")
         return refused(f'{error}; this needs: pip install "hydrone-gym[{extra}]"' if extra else error)
+    except EvaluationStopped as error:
+        return refused(error, 1)
     except (ValueError, TypeError, OSError, DependencyNotInstalled) as error:
         return refused(error)
     return code

@@ -13,7 +13,7 @@ from hydrone_gym.cli import refused
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
-from hydrone_gym.evaluation.run import EvaluationStopped, carry_out
+from hydrone_gym.evaluation.run import carry_out
 from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, RunFolder, write_results
 from hydrone_gym.evaluation.shown import Writer
 from hydrone_gym.evaluation.tables import print_tables
@@ -68,7 +68,7 @@ class Evaluate:
             self.report.mkdir(parents=True, exist_ok=True)
         try:
             return self._fly(plan, folder)
-        except (EvaluationStopped, OSError) as error:
+        except OSError as error:  # a full disk, after the input was found good
             return refused(error, 1)
         except KeyboardInterrupt:
             print("hydrone: interrupted; finished flights are kept, the same command goes on", file=sys.stderr)

@@ -136,6 +136,16 @@ def test_a_policy_that_is_another_one_in_a_batch():
         find_failures(make_plan(suite, {"crowd": Crowd.for_env}))
 
 
+def test_a_policy_that_raises_gives_1(tmp_path, capsys):
+    (tmp_path / "leaky.py").write_text(
+        "class Leaky:\n  def __init__(self, env):\n    pass\n  predict = None.__init__\n"
+    )
+    options = ["--agent", f"{tmp_path / 'leaky.py'}:Leaky", "--episodes", "1", "--out", str(tmp_path)]
+    assert main(["failures", *options]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "failed in suite held-out, mission HydroneGym/Mission-v0, world 0: TypeError" in line
+
+
 @pytest.mark.parametrize("mission", MISSIONS)
 def test_features_of_worlds(mission):
     """Against a search of 2001 points of the line, sphere by sphere."""

@@ -79,6 +79,12 @@ def test_a_recipe_that_is_no_yaml_is_told_in_one_line(tmp_path, capsys, text):
 
     assert not (tmp_path / "run").exists()
 
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "config.yaml").write_text(text)
+    assert main(["train", "--resume", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"hydrone: error: {tmp_path / 'run' / 'config.yaml'}: no YAML: ")
+
 
 def test_bad_seed(tmp_path, capsys):
     assert main(["train", "--out", str(tmp_path), "--seed", "-1"]) == 2
