@@ -104,6 +104,6 @@ def shipped_agents() -> list[str]:
 
 
 def _simulation_of(env: Any) -> Simulation:
-    from planners.policy import simulation_of
+    from planners.belief import belief_of
 
-    return simulation_of(env)
+    return belief_of(env)

@@ -16,10 +16,9 @@ import hydrone_gym  # noqa: F401  (registers the environments)
 from benchmarks import freeze_suites, tables
 from benchmarks.timing import ROOT, Contestant, in_turns, save
 from hydrone_gym.evaluation import Flight, fly
+from hydrone_gym.rendering.camera import View
 from hydrone_gym.rendering.frame import Painter
-from hydrone_gym.rendering.moment import replay
-from hydrone_gym.rendering.video import moment_of
-from hydrone_gym.rendering.view import View
+from hydrone_gym.rendering.track import moment_of, moments
 from planners import CLRRT
 
 DENSE = {"num_obstacles": 40, "obstacle_radius": freeze_suites.DENSE}
@@ -56,12 +55,12 @@ def scene(name: str) -> Contestant:
     painter = Painter(view, env.unwrapped.world, env.unwrapped.vehicle)  # type: ignore[attr-defined]
     last = moment_of(flight)
     counts = range(len(last.ticks) - TICKS + 1, len(last.ticks) + 1)
-    moments = list(replay(last, counts, env.unwrapped.world.sensor_range))  # type: ignore[attr-defined]
+    shown = list(moments(last, counts, env.unwrapped.world.sensor_range))  # type: ignore[attr-defined]
 
     def run() -> float:
-        for moment in moments:
+        for moment in shown:
             painter.paint(moment)
-        return len(moments)
+        return len(shown)
 
     return Contestant(name, run)
 
@@ -71,7 +70,7 @@ def draw() -> None:
     env, flight = flown(5, DENSE)
     world, vehicle = env.unwrapped.world, env.unwrapped.vehicle  # type: ignore[attr-defined]
     for name, (camera, ticks) in PICTURES.items():
-        (moment,) = replay(moment_of(flight), [ticks], world.sensor_range)
+        (moment,) = moments(moment_of(flight), [ticks], world.sensor_range)
         picture = Painter(View(camera=camera), world, vehicle).paint(moment)
         Image.fromarray(picture).save(ROOT / "docs" / "images" / name, optimize=True)
 

@@ -93,7 +93,7 @@ def respond(vehicle: Vehicle, step: Step) -> Response:
         overshoot=float(max(share.max() - 1.0, 0.0)),
         settling=float(times[min(late[-1] + 1, len(times) - 1)]) if len(late) else 0.0,
         lateral_speed=float(log[:, 2].max()) if len(log) else 0.0,
-        tilt=float(np.degrees(log[:, 3].max())) if len(log) else 0.0,
+        tilt=float(np.degrees(np.arccos(log[:, 3].min()))) if len(log) else 0.0,
         crossing_time=float(log[0, 0]) if len(log) else np.nan,
     )
 

@@ -7,6 +7,8 @@ cache. Three rules hold everywhere and are the reason for this file:
 * the NumPy error model: a division by zero gives ``inf`` instead of a branch, which keeps loops over lanes vectorised;
 * the cache is keyed by the source of a kernel's module and of every module that one imports. Numba's stock cache looks
   only at the file of the outermost function and goes stale when a function it inlines is edited in another file.
+
+Kernels read and write what they work on through `hydrone_gym._memory`.
 """
 
 import functools
@@ -20,6 +22,8 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core import sigutils
+from numba.core.ccallback import CFunc
 
 _ROOT = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(r"^\s*from ((?:hydrone_gym|planners|agents)[\w.]*) import", re.MULTILINE)
@@ -72,18 +76,37 @@ def cache_root() -> Path | None:
     return None
 
 
-def kernel(function: Callable) -> Any:
-    """Compile an entry point: a function that Python calls, cached on disk."""
-    dispatcher = numba.njit(**_OPTIONS)(function)
+def _cached(compiled: Any, module: str) -> Any:
+    """Let a compiled function keep its machine code on disk, under the fingerprint of a module."""
     root = cache_root()
     if root is not None:
         before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(root / _fingerprint(function.__module__))
+        numba.config.CACHE_DIR = str(root / _fingerprint(module))
         try:
-            dispatcher.enable_caching()
+            compiled.enable_caching()
         finally:
             numba.config.CACHE_DIR = before
-    return dispatcher
+    return compiled
+
+
+def kernel(function: Callable) -> Any:
+    """Compile an entry point: a function that Python calls, cached on disk."""
+    return _cached(numba.njit(**_OPTIONS)(function), function.__module__)
+
+
+def unit(signature: Any, function: Callable, module: str) -> Any:
+    """Compile a function that other kernels call by its `address`, see `hydrone_gym._memory.call`; cached on disk.
+
+    Its callers do not contain it: they compile without it, and are the same for every variant of it.
+
+    Args:
+        signature: Numba types; pointers and numbers only.
+        function: what it closes over must be plain data or classes, which do not change from process to process.
+        module: under whose fingerprint it is cached, one that imports everything the function uses.
+    """
+    unit = CFunc(function, sigutils.normalize_signature(signature), {}, _OPTIONS)
+    _cached(unit, module).compile()
+    return unit
 
 
 def inlined(function: Callable) -> Any:

@@ -3,18 +3,18 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined
-from hydrone_gym.world.bodies import segment_distance
+from hydrone_gym._memory import gather
+from hydrone_gym.simulation.storage import Pose
+from hydrone_gym.world.bodies import BODY, segment_distance
 
 
 @inlined
-def clearance_between(a, b, spheres, first, count, radius):
-    """Least clearance (m) of a vehicle on the straight path between two points (m), infinite without spheres.
+def clearance_between(a, b, lane, first, radius):
+    """Least clearance (m) of a vehicle on the straight path between two points (x, y, z), infinite without spheres.
 
-    `spheres` are flat, x, y, z, r in m; those numbered from `first` up to `count` are looked at.
+    `lane` is a rollout's: of its obstacles those numbered from `first` on are looked at.
     """
     least = np.inf
-    for j in range(first, count):
-        k = 4 * j
-        body = (spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
-        least = min(least, segment_distance(a, b, body) - radius)
+    for j in range(first, lane.number):
+        least = min(least, segment_distance(a, b, gather(lane.obstacles, BODY * j, 0, 1, Pose)) - radius)
     return least

@@ -1,19 +1,20 @@
 """Model predictive path integral control over references, on the batch kernel."""
 
 import math
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import kernel
-from hydrone_gym.control.envelope import envelope_of
-from hydrone_gym.simulation.block import CROSSING_FIELDS, LANES, LOGGED_CROSSINGS, new_block
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rows import advance_rows, new_rows
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.rollout import Flock
+from hydrone_gym.simulation.simulation import row_at
+from hydrone_gym.simulation.storage import LANES
 from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
-from planners.policy import Known, PlannerPolicy, simulation_of
+from hydrone_gym.surface import in_air
+from planners.belief import Belief
+from planners.policy import Known, PlannerPolicy, whole_number
 from planners.straight_line import StraightLine
 
 _REACH = np.array([1.4, 1.4, 1.2])  # m: the reference is at most this far from the vehicle, along x, y and z
@@ -75,7 +76,7 @@ class MPPI(PlannerPolicy):
     the place where it came out of the water; promise anything about space not sensed yet, as no stop is verified.
 
     Args:
-        simulation: supplies vehicle, world and period.
+        belief: supplies vehicle, world and period.
         samples: flights a cycle.
         horizon: periods ahead.
         seed: of the random stream; every episode starts it anew.
@@ -84,22 +85,16 @@ class MPPI(PlannerPolicy):
         ValueError: an argument out of range.
     """
 
-    def __init__(self, simulation: Simulation, *, samples: int = 256, horizon: int = 10, seed: int = 0) -> None:
+    def __init__(self, belief: Belief | Any, *, samples: int = 256, horizon: int = 10, seed: int = 0) -> None:
         """Check the budget."""
-        for name, number, least in (("samples", samples, LANES), ("horizon", horizon, 2), ("seed", seed, 0)):
-            if isinstance(number, bool) or not isinstance(number, int) or number < least:
-                raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
-        self.samples, self.horizon, self.seed = samples, horizon, seed
-        self._simulation = simulation
-        self._line = StraightLine(simulation)
-        self._speeds = cruise_speeds(envelope_of(simulation.vehicle))
-        self._low = np.array(simulation.world.lower, np.float32).astype(np.float64)
-        self._high = np.array(simulation.world.upper, np.float32).astype(np.float64)
-
-    @classmethod
-    def for_env(cls, env: Any, *, samples: int = 256, horizon: int = 10, seed: int = 0) -> Self:
-        """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
-        return cls(simulation_of(env), samples=samples, horizon=horizon, seed=seed)
+        self.samples = whole_number("samples", samples, LANES)
+        self.horizon, self.seed = whole_number("horizon", horizon, 2), whole_number("seed", seed, 0)
+        model = Belief.of(belief)
+        self._simulation = model.simulation(LANES)
+        self._line = StraightLine(model)
+        self._speeds = cruise_speeds(model.envelope)
+        self._low = np.array(model.world.lower, np.float32).astype(np.float64)
+        self._high = np.array(model.world.upper, np.float32).astype(np.float64)
 
     def act(self, now: Known, memory: Plan | None) -> tuple[NDArray[np.float64], Plan]:
         """Return the reference (4,) for the next period (m, m, m, rad) and the memory."""
@@ -121,31 +116,24 @@ class MPPI(PlannerPolicy):
         mean = np.tensordot(weights / weights.sum(), offsets, 1)
         finalists = np.stack([mean, *offsets[np.argsort(costs, kind="stable")[:_BEST]]])
         plan = finalists[np.argmin(self._fly(now, finalists))]
-        psi = now.reference[3] if now.state[2] > 0.0 else now.state[5]
+        psi = now.reference[3] if in_air(now.state[2]) else now.state[5]
         point = np.clip(now.state[:3] + plan[0], self._low, self._high)
         return np.append(point, psi), Plan(np.vstack([plan[1:], plan[-1:]]), last.cycle + 1)
 
     def _fly(self, now: Known, offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """Fly every sequence of offsets (n, horizon, 3) in closed loop; return the costs (n,) in s."""
-        sim, count, number = self._simulation, len(now.obstacles), len(offsets)
-        rows = new_rows(number)
-        rows["state"], rows["integral"], rows["reference"] = now.state, now.integral, now.reference
-        rows["goal"], rows["clearance"] = now.goal, np.inf
-        blocks = -(-number // LANES)
-        spheres = np.tile(np.repeat(now.obstacles.reshape(-1), LANES), (blocks, 1))
-        closest = np.full((blocks, count * LANES), np.inf)
-        block, log = new_block(LANES), np.zeros((LANES, LOGGED_CROSSINGS, len(CROSSING_FIELDS)))
-        costs = np.zeros(number)
+        start: Any = row_at(now.state, now.goal)
+        start["integral"], start["reference"] = now.integral, now.reference
+        flock = Flock(self._simulation, start, len(offsets), now.obstacles)
+        rows, costs = flock.rows, np.zeros(len(offsets))
         for k in range(self.horizon):
             before = rows["outcome"].copy()
-            air = rows["state"][:, 2] > 0.0
+            air = in_air(rows["state"][:, 2])
             points = np.clip(rows["state"][:, :3] + offsets[:, k], self._low, self._high)
             psi = np.where(air, rows["reference"][:, 3], rows["state"][:, 5])
-            references = np.float32(np.column_stack([points, psi])).astype(np.float64)
-            ticks = sim.ticks
-            advance_rows(rows, references, spheres, closest, count, sim.values, 0, ticks, ticks, block, log)
+            flock.fly(np.column_stack([points, psi]).astype(np.float32).astype(np.float64))
             weight = 1.0 if k == self.horizon - 1 else 1.0 / self.horizon
-            add_costs(rows, self._speeds, sim.world.zone, before, weight, costs)
+            add_costs(rows, self._speeds, self._simulation.world.zone, before, weight, costs)
         lost = np.maximum(0.0, 1.0 - rows["clearance"] / _MARGIN)
         failed = (rows["outcome"] != RUNNING) & (rows["outcome"] != GOAL)
         return costs + _NEARNESS * lost**2 + _FAILURE * failed

@@ -2,16 +2,16 @@
 
 import itertools
 import math
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.vehicle import WATER_DENSITY
+from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import gaps_along
-from planners.cl_rrt.references import AIR_GATE, WATER_GATE
-from planners.policy import Known, PlannerPolicy, simulation_of
+from planners.belief import Belief
+from planners.policy import Known, PlannerPolicy, whole_number
+from planners.stop_check import AIR_GATE, WATER_GATE
 
 _GOAL_BIAS = 0.2
 _COLUMN_BIAS = 0.3  # share of samples that are crossings, while the mission must change medium
@@ -48,7 +48,7 @@ class OpenLoopRRT(PlannerPolicy):
     water, or how far it needs to stop; the margin has to cover for all of that and is not proven to.
 
     Args:
-        simulation: supplies speed limits, period and world.
+        belief: supplies speed limits, period and world.
         samples: most samples a plan may take; without a path the vehicle holds still and tries again next period.
         margin: clearance of edges, m.
         lead: the reference waits while it is this far ahead of the vehicle, m; infinite for one that never waits.
@@ -59,32 +59,23 @@ class OpenLoopRRT(PlannerPolicy):
     """
 
     def __init__(
-        self, simulation: Simulation, *, samples: int = 1000, margin: float = 0.4, lead: float = 1.0, seed: int = 0
+        self, belief: Belief | Any, *, samples: int = 1000, margin: float = 0.4, lead: float = 1.0, seed: int = 0
     ) -> None:
         """Check the arguments and work out the cruise speeds."""
-        for name, number, least in (("samples", samples, 1), ("seed", seed, 0)):
-            if isinstance(number, bool) or not isinstance(number, int) or number < least:
-                raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
+        self.samples, self.seed = whole_number("samples", samples, 1), whole_number("seed", seed, 0)
         if not 0.0 <= margin < math.inf:
             raise ValueError(f"margin must be finite and not negative (m), got {margin!r}")
         if not lead > 0.5:  # the law under water holds still within 0.4 m of the reference
             raise ValueError(f"lead must be more than 0.5 m, got {lead!r}")
-        vehicle = simulation.vehicle
-        self.samples, self.margin, self.lead, self.seed = samples, margin, lead, seed
-        self._radius = vehicle.radius
-        self._period = simulation.period
-        self._low = np.array(simulation.world.lower) + _WALL
-        self._high = np.array(simulation.world.upper) - _WALL
-        surge = math.sqrt(2.0 * vehicle.water_gains.surge_limit / (WATER_DENSITY * vehicle.drag[0]))
-        air, water = vehicle.air_gains, vehicle.water_gains
-        self._air_speed = _CRUISE * np.array([air.speed_limit, air.vertical_speed_limit])
-        self._water_speed = _CRUISE * np.array([surge, water.vertical_speed_limit])
-        self._zone_speed = _CRUISE * air.zone_speed_limit
-
-    @classmethod
-    def for_env(cls, env: Any, *, samples: int = 1000, margin: float = 0.4, lead: float = 1.0, seed: int = 0) -> Self:
-        """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
-        return cls(simulation_of(env), samples=samples, margin=margin, lead=lead, seed=seed)
+        model = Belief.of(belief)
+        self.margin, self.lead = margin, lead
+        self._radius, self._period, limits = model.vehicle.radius, model.period, model.envelope
+        self._low = np.array(model.world.lower) + _WALL
+        self._high = np.array(model.world.upper) - _WALL
+        self._ahead = {True: limits.ahead_air, False: limits.ahead_water}
+        self._air_speed = _CRUISE * np.array([limits.cruise, limits.climb])
+        self._water_speed = _CRUISE * np.array([limits.surge, limits.dive])
+        self._zone_speed = _CRUISE * limits.zone
 
     def act(self, now: Known, memory: Track | None) -> tuple[NDArray[np.float64], Track]:
         """Return the reference (4,) for the next period (m, m, m, rad) and the memory."""
@@ -94,9 +85,9 @@ class OpenLoopRRT(PlannerPolicy):
         if not len(path) or (count > track.known and self._blocked(path, progress, now.obstacles)):
             random = np.random.Generator(np.random.Philox(key=self.seed, counter=track.cycle))
             path, progress = self.plan(now, random), 0.0
-        psi = now.reference[3] if position[2] > 0.0 else now.state[5]
+        psi = now.reference[3] if in_air(position[2]) else now.state[5]
         if not len(path):
-            still = position + (0.2 if position[2] > 0.0 else 0.1) * now.state[6:9]
+            still = position + self._ahead[bool(in_air(position[2]))] * now.state[6:9]
             return np.append(still, psi), Track(path, 0.0, count, track.cycle + 1)
         progress, point = self._move(path, progress, now.state)
         return np.append(point, psi), Track(path, progress, count, track.cycle + 1)
@@ -123,7 +114,7 @@ class OpenLoopRRT(PlannerPolicy):
         for _ in range(self.samples):
             point, column = self._sample(start, goal, random)
             side = np.array(points)
-            able = np.flatnonzero((side[:, 2] >= AIR_GATE) if point[2] > 0.0 else (side[:, 2] <= -WATER_GATE))
+            able = np.flatnonzero((side[:, 2] >= AIR_GATE) if in_air(point[2]) else (side[:, 2] <= -WATER_GATE))
             if not len(able):
                 continue
             apart = np.linalg.norm(side[able] - point, axis=1)
@@ -133,7 +124,7 @@ class OpenLoopRRT(PlannerPolicy):
             if not grow(nearest, point) or step < 1.0:
                 continue
             if column:
-                beyond = -WATER_GATE if point[2] > 0.0 else AIR_GATE
+                beyond = -WATER_GATE if in_air(point[2]) else AIR_GATE
                 grow(len(points) - 1, np.array([point[0], point[1], beyond]))
             elif point is goal:
                 return self._shorten(points, parents, spheres, need)
@@ -145,7 +136,7 @@ class OpenLoopRRT(PlannerPolicy):
         """Draw a point outside the zone, the goal itself, or the gate on this side of a crossing (then True)."""
         kind, medium, *unit = random.random(5)
         low, high = self._low, self._high
-        air, change = start[2] > 0.0, (start[2] > 0.0) != (goal[2] > 0.0)
+        air, change = in_air(start[2]), in_air(start[2]) != in_air(goal[2])
         if kind < _GOAL_BIAS:
             return goal, False
         if change and kind < _GOAL_BIAS + _COLUMN_BIAS:
@@ -192,11 +183,11 @@ class OpenLoopRRT(PlannerPolicy):
         while left > 1e-9 and progress < ends[-1] - 1e-9:
             i = int(np.searchsorted(ends, progress + 1e-9, side="right")) - 1
             lag = float(np.linalg.norm(_point_at(path, ends, progress) - state[:3]))
-            crossing = (path[i, 2] > 0.0) != (path[i + 1, 2] > 0.0)
+            crossing = in_air(path[i, 2]) != in_air(path[i + 1, 2])
             late = lag > _AT_GATE[0] or float(np.linalg.norm(state[6:9])) > _AT_GATE[1]
             if lag >= self.lead or (crossing and progress - ends[i] < 1e-6 and late):
                 break
-            speed = self._speed(path[i + 1] - path[i], path[i, 2] > 0.0, crossing)
+            speed = self._speed(path[i + 1] - path[i], in_air(path[i, 2]), crossing)
             step = min(left * speed, ends[i + 1] - progress, self.lead - lag)
             progress += step
             left -= max(step / speed, 1e-3)

@@ -1,12 +1,12 @@
 """What every planner is: a policy with Stable-Baselines3's `predict`, for one observation or a batch."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
+from planners.belief import Belief, belief_of
 
 Observation = Mapping[str, NDArray]
 KEYS = ("state", "integral", "reference", "goal", "obstacles")
@@ -21,17 +21,17 @@ class Known(NamedTuple):
     goal: NDArray[np.float64]  # (3,)
     obstacles: NDArray[np.float64]  # (k, 4) detected so far
 
+    @property
+    def vessel(self) -> NDArray[np.float64]:
+        """State, controller memory and reference in force as one vessel, with no energy spent."""
+        return np.concatenate([self.state, self.integral, [0.0], self.reference])
 
-def simulation_of(env: Any) -> Simulation:
-    """Return the `Simulation` of an environment, wrapped or not, or of the first one in a vector of them.
 
-    Raises TypeError for anything that is not a HyDrone environment.
-    """
-    first = env.envs[0] if hasattr(env, "envs") else env
-    simulation = getattr(getattr(first, "unwrapped", first), "simulation", None)
-    if not isinstance(simulation, Simulation):
-        raise TypeError(f"for_env needs a HyDrone environment or a vector of them, got {type(env).__name__}")
-    return simulation
+def whole_number(name: str, value: Any, least: int) -> int:
+    """Return a whole number that is large enough; raises ValueError naming it."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, got {value!r}")
+    return value
 
 
 def known(observation: Observation, index: int | None = None) -> Known:
@@ -53,11 +53,29 @@ def known(observation: Observation, index: int | None = None) -> Known:
 
 
 class PlannerPolicy:
-    """Base of the planners: subclasses say what to do for one environment in `act`.
+    """Base of the planners: subclasses take a belief and options, and say what to do for one environment in `act`.
 
     Memory travels in `state`, one entry an environment, and `act` never changes the memory it is given, so an old
     state can be used again.
     """
+
+    def __init__(self, belief: Belief | Any, **options: Any) -> None:
+        """Take what to believe, a `Belief` or any model with vehicle, world and period."""
+        raise NotImplementedError(f"{type(self).__name__} must define __init__(belief, ...)")
+
+    @classmethod
+    def for_env(cls, env: Any, *, belief: Belief | Literal["truth"] | None = None, **options: Any) -> Self:
+        """Make a planner for a HyDrone environment or a vector of them.
+
+        Args:
+            env: the environment; nothing but its description is read.
+            belief: what to predict with instead of the nominal model, see `planners.belief.belief_of`.
+            options: keywords of the class.
+
+        Raises:
+            TypeError: anything that is not a HyDrone environment, or an option that the class does not have.
+        """
+        return cls(belief_of(env, belief), **options)
 
     def act(self, now: Known, memory: Any) -> tuple[NDArray[np.float64], Any]:
         """Return the reference (4,) for the next period and the new memory; memory is None when an episode starts."""

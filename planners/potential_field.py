@@ -1,14 +1,15 @@
 """Artificial potential field: a reactive planner that looks at what is near now and nowhere else."""
 
 import math
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import GATE
-from planners.policy import Known, PlannerPolicy, simulation_of
+from hydrone_gym.surface import in_air
+from planners.belief import Belief
+from planners.policy import Known, PlannerPolicy
 from planners.straight_line import SWIM_LEAD, StraightLine
 
 _NEAREST = 0.05  # m: clearances are not taken smaller, so that the force stays finite
@@ -38,7 +39,7 @@ class PotentialField(PlannerPolicy):
     to get round something.
 
     Args:
-        simulation: supplies speed limits, period and world.
+        belief: supplies speed limits, period and world.
         influence: distance rho_0 from which spheres repel, m.
         gain: of the repulsion, in units of the attraction, m^3; 1 balances it at a clearance of 0.8 m.
 
@@ -46,31 +47,27 @@ class PotentialField(PlannerPolicy):
         ValueError: an argument that is not positive.
     """
 
-    def __init__(self, simulation: Simulation, *, influence: float = 2.0, gain: float = 1.0) -> None:
+    def __init__(self, belief: Belief | Any, *, influence: float = 2.0, gain: float = 1.0) -> None:
         """Check the field and read the limits."""
         for name, value, unit in (("influence", influence, "m"), ("gain", gain, "m^3")):
             if not 0.0 < value < math.inf:
                 raise ValueError(f"{name} must be positive ({unit}), got {value!r}")
         self.influence = influence
         self.gain = gain
-        self._line = StraightLine(simulation)
-        self._world = simulation.world
-        self._radius = simulation.vehicle.radius
-        self._step = simulation.period * simulation.vehicle.air_gains.speed_limit
+        model = Belief.of(belief)
+        self._line = StraightLine(model)
+        self._world = model.world
+        self._radius = model.vehicle.radius
+        self._step = model.period * model.envelope.cruise
         self._low, self._high = np.array(self._world.lower) + _WALL, np.array(self._world.upper) - _WALL
-        self._gate = max(GATE, simulation.world.zone + 0.3)
-
-    @classmethod
-    def for_env(cls, env: Any, *, influence: float = 2.0, gain: float = 1.0) -> Self:
-        """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
-        return cls(simulation_of(env), influence=influence, gain=gain)
+        self._gate = max(GATE, model.world.zone + 0.3)
 
     def act(self, now: Known, memory: Any) -> tuple[NDArray[np.float64], None]:
         """Return the reference (4,) for the next period (m, m, m, rad) and no memory."""
         position = now.state[:3]
         aim = self._aim(now)
         reference, _ = self._line.act(now._replace(goal=aim), None)
-        crossing = (reference[2] > 0.0) != (position[2] > 0.0)
+        crossing = in_air(reference[2]) != in_air(position[2])
         if crossing or abs(position[2]) <= self._world.zone:
             return reference, None
         pull = reference[:3] - position
@@ -81,7 +78,7 @@ class PotentialField(PlannerPolicy):
         force = self._force(pull / length, near, away, length)
         ahead = near[away @ force < 0.0]
         speed = min(1.0, max(_SLOWEST, ahead.min(initial=np.inf) / _SLOW))
-        air = position[2] > 0.0
+        air = in_air(position[2])
         lead = speed * min(length, self._step) if air else max(speed * SWIM_LEAD, _TURNING_LEAD)
         reference[:3] = position + min(lead, length) * force
         reference[:3] = np.clip(reference[:3], self._low, self._high)
@@ -92,15 +89,15 @@ class PotentialField(PlannerPolicy):
     def _aim(self, now: Known) -> NDArray[np.float64]:
         """Where to go next: the goal, or the foot of a free column if the one for the crossing is blocked."""
         position, goal = now.state[:3], now.goal
-        if (position[2] > 0.0) == (goal[2] > 0.0):
+        if in_air(position[2]) == in_air(goal[2]):
             return goal
-        over = goal if position[2] > 0.0 else position
+        over = goal if in_air(position[2]) else position
         x, y = self._free_column(over[0], over[1], now.obstacles)
         aside = math.hypot(x - over[0], y - over[1])
-        if aside < _AT_COLUMN or (position[2] < 0.0 and position[2] >= -self._world.zone):
+        if aside < _AT_COLUMN or (not in_air(position[2]) and position[2] >= -self._world.zone):
             return goal
-        depth = -self._gate if position[2] > 0.0 else min(position[2], -self._gate)
-        if position[2] < 0.0:  # swim beyond the hold radius, or the vehicle stops short of the column
+        depth = -self._gate if in_air(position[2]) else min(position[2], -self._gate)
+        if not in_air(position[2]):  # swim beyond the hold radius, or the vehicle stops short of the column
             share = max(1.0, _TURNING_LEAD / aside)
             x, y = position[0] + share * (x - position[0]), position[1] + share * (y - position[1])
         return np.array([x, y, depth])

@@ -1,24 +1,25 @@
 """The CL-RRT as the paper prints it, for comparison with the one that is made safe."""
 
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym._memory import packed
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rows import new_rows
-from hydrone_gym.simulation.simulation import Simulation
-from planners.cl_rrt.execute import cycle
-from planners.cl_rrt.expand import DRAWS
+from hydrone_gym.simulation.rollout import Rollout
+from hydrone_gym.simulation.simulation import row_at
+from hydrone_gym.surface import in_air
+from planners.belief import Belief
+from planners.cl_rrt.execute import Constants, Query, cycle
+from planners.cl_rrt.expand import DRAWS, STRAIGHT_ON
 from planners.cl_rrt.objective import objective_params
-from planners.cl_rrt.references import AHEAD_AIR, AHEAD_WATER, AIR_GATE, WATER_GATE
 from planners.cl_rrt.settings import CLRRTSettings
-from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, new_nodes, new_workspace
-from planners.policy import Known, PlannerPolicy, simulation_of
+from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, Workspace, new_nodes
+from planners.policy import Known, PlannerPolicy, whole_number
+from planners.stop_check import AIR_GATE, WATER_GATE
 
-_ORDER = 1  # the draw that chooses between nearest and least cost; from 0.5 on it is nearest
 _SPEED_SHARE = 0.95  # of the speed limit, at which references move in air
-_COLUMN_RADIUS = 10.0  # m: samples beyond the surface, all over the box
 _FULL = 0.75  # share of its capacity at which a tree starts anew
 
 
@@ -47,7 +48,7 @@ class PublishedCLRRT(PlannerPolicy):
     the vehicle. So this is the same planner less its safety, and no literal copy.
 
     Args:
-        simulation: model, world and period to plan with.
+        belief: the `Belief`, or any model, to plan with.
         iterations: samples a cycle.
         seed: of the random stream; every episode starts it anew.
 
@@ -55,22 +56,16 @@ class PublishedCLRRT(PlannerPolicy):
         ValueError: a budget or seed out of range.
     """
 
-    def __init__(self, simulation: Simulation, *, iterations: int = 100, seed: int = 0) -> None:
-        """Check the budget; settings without margin and with columns all over the box."""
-        for name, number, least in (("iterations", iterations, 1), ("seed", seed, 0)):
-            if isinstance(number, bool) or not isinstance(number, int) or number < least:
-                raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
-        self.iterations, self.seed = iterations, seed
-        self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
-        self._settings = CLRRTSettings(margin=0.0, column_radius=_COLUMN_RADIUS)
-        speed = _SPEED_SHARE * simulation.vehicle.air_gains.speed_limit
-        self._params = self._settings.params(speed * simulation.period)
-        self._objective = objective_params(simulation, "paper")
-
-    @classmethod
-    def for_env(cls, env: Any, *, iterations: int = 100, seed: int = 0) -> Self:
-        """Return the policy for a HyDrone environment or a vector of them; arguments as for the class."""
-        return cls(simulation_of(env), iterations=iterations, seed=seed)
+    def __init__(self, belief: Belief | Any, *, iterations: int = 100, seed: int = 0) -> None:
+        """Check the budget."""
+        self.iterations = whole_number("iterations", iterations, 1)
+        self.seed = whole_number("seed", seed, 0)
+        self._belief = Belief.of(belief)
+        self._simulation = self._belief.simulation()
+        self._settings = CLRRTSettings(margin=0.0)
+        envelope = self._belief.envelope
+        params = self._settings.params(_SPEED_SHARE * envelope.cruise * self._belief.period)
+        self._constants = Constants(packed(envelope), packed(params), packed(objective_params(envelope, "paper")))
 
     def act(self, now: Known, memory: PublishedMemory | None) -> tuple[NDArray[np.float64], PublishedMemory]:
         """Run one cycle of the execution loop; return the reference (4,) and the new memory."""
@@ -86,51 +81,51 @@ class PublishedCLRRT(PlannerPolicy):
             _prune(nodes[:size], failed)
         # no path: the tree waits with the vehicle and goes on growing; from the middle of a crossing it cannot
         root = 0 if nodes["kind"][0] == OPEN else -1
-        return _hover(now), PublishedMemory(nodes, size, root, count, memory.cycle + 1)
+        return self._hover(now), PublishedMemory(nodes, size, root, count, memory.cycle + 1)
+
+    def _hover(self, now: Known) -> NDArray[np.float64]:
+        """The safety action: stay where the vehicle is, a little ahead along its velocity and outside the zone."""
+        air, limits = in_air(now.state[2]), self._belief.envelope
+        x, y, z = now.state[:3] + (limits.ahead_air if air else limits.ahead_water) * now.state[6:9]
+        return np.array(
+            [x, y, max(z, AIR_GATE) if air else min(z, -WATER_GATE), now.reference[3] if air else now.state[5]]
+        )
 
     def _grow(self, now: Known, memory: PublishedMemory) -> tuple[np.ndarray, int]:
         """Root the tree at the vehicle, prune what new spheres block, and expand it; return a new tree."""
-        work = new_workspace(memory.nodes.copy(), now.obstacles, np.zeros((BACKUP, 4)))
+        work = Workspace.around(memory.nodes.copy(), np.zeros((BACKUP, 4)), self._simulation, now.obstacles)
         random = np.random.Generator(np.random.Philox(key=self.seed, counter=memory.cycle))
-        draws = random.random(self.iterations * DRAWS)
-        draws[_ORDER::DRAWS] = 0.5 + 0.5 * draws[_ORDER::DRAWS]
-        observed = np.concatenate([now.state, now.integral, now.reference])
-        root = memory.root if memory.size < _FULL * len(memory.nodes) else -1
-        size, *_ = cycle(
-            work,
-            self._simulation.values,
-            now.goal,
-            observed,
-            now.state[:3],
-            memory.size,
-            root,
-            memory.known,
-            draws,
-            self.iterations,
-            self._params,
-            self._objective,
-            0,
-            self._simulation.ticks,
-            True,
-            False,  # choosing is done here
+        query = Query(
+            start=now.vessel,
+            goal=now.goal,
+            eye=now.state[:3],
+            draws=random.random(self.iterations * DRAWS),
+            size=memory.size,
+            root=memory.root if memory.size < _FULL * len(memory.nodes) else -1,
+            known_before=memory.known,
+            held=now.reference,
+            holds=False,
+            roam=STRAIGHT_ON,
+            iterations=self.iterations,
+            begin=True,
+            finish=False,  # choosing is done here
         )
+        size, *_ = cycle(work, query, self._constants)
         return work.nodes, size
 
     def _propagate(self, nodes: np.ndarray, end: int, now: Known) -> int:
         """Propagate the branch to node `end` again from the root, into the nodes; return the node that fails or -1."""
-        row = new_rows(1)
-        row["state"], row["integral"], row["reference"] = now.state, now.integral, now.reference
-        row["goal"], row["clearance"] = now.goal, np.inf
-        spheres, closest = now.obstacles.reshape(1, -1), np.full((1, len(now.obstacles)), np.inf)
+        row: Any = row_at(now.state, now.goal)
+        row["integral"], row["reference"] = now.integral, now.reference
+        rollout = Rollout(self._simulation, now.obstacles)
         for i in _path(nodes, end):
-            node, before = nodes[i], row["crossings"][0]
-            self._simulation.advance(row, node["reference"][None].copy(), spheres, closest, len(now.obstacles))
+            node = nodes[i]
+            flown = rollout.fly(row, node["reference"])
             vertical = node["kind"] == CROSSING or nodes["kind"][node["parent"]] == CROSSING
-            ended = row["outcome"][0] not in (RUNNING, GOAL)
-            if ended or (row["crossings"][0] > before and not vertical):
+            if flown.outcome not in (RUNNING, GOAL) or (flown.crossings > 0.0 and not vertical):
                 return int(i)
             node["state"], node["integral"] = row["state"][0], row["integral"][0]
-            if row["outcome"][0] == GOAL:
+            if flown.outcome == GOAL:
                 break
         return -1
 
@@ -160,12 +155,3 @@ def _prune(tree: np.ndarray, top: int) -> None:
     for i in range(top + 1, len(dead)):
         dead[i] |= dead[parents[i]]
     tree["dead"] = dead
-
-
-def _hover(now: Known) -> NDArray[np.float64]:
-    """The safety action: stay where the vehicle is, a little ahead along its velocity and outside the zone."""
-    if now.state[2] > 0.0:
-        x, y, z = now.state[:3] + AHEAD_AIR * now.state[6:9]
-        return np.array([x, y, max(z, AIR_GATE), now.reference[3]])
-    x, y, z = now.state[:3] + AHEAD_WATER * now.state[6:9]
-    return np.array([x, y, min(z, -WATER_GATE), now.state[5]])

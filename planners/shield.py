@@ -17,26 +17,45 @@ another direction, checked like any other reference; from there the policy tries
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS, new_block
-from hydrone_gym.simulation.rows import new_rows
-from hydrone_gym.simulation.simulation import Simulation
-from planners.cl_rrt.references import AIR_GATE, WATER_GATE
-from planners.policy import KEYS, simulation_of
-from planners.stop_check import HELD, RETREAT, guard
+from hydrone_gym._jit import inlined, kernel
+from hydrone_gym._memory import gather, packed, pointer, scatter, view
+from hydrone_gym.control.envelope import Envelope
+from hydrone_gym.physics.trigonometry import sincos
+from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.rollout import Lane, Rollout, lane_of
+from hydrone_gym.simulation.storage import VESSEL, Point, Pose, new_rows, vehicle_of, world_of
+from hydrone_gym.surface import in_air
+from hydrone_gym.world.bodies import BODY, NOWHERE, segment_distance
+from planners.belief import Belief, belief_of
+from planners.policy import KEYS
+from planners.stop_check import (
+    AIR_GATE,
+    HELD,
+    MARGIN,
+    RETREAT,
+    WATER_GATE,
+    Check,
+    goes_on,
+    inside,
+    margin_left,
+    single,
+    state_of,
+    verify,
+)
 
 __all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
 
+_NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
 PATIENCE = 7  # refusals within `_PLACE` of one place after which the vehicle is sent aside
 ASIDE = 14  # periods that a step aside lasts: down out of the zone and then some
 _PLACE = 0.5  # m
 _STEP_ASIDE = 2.0  # m
 _TURN = np.pi * (3.0 - np.sqrt(5.0))  # rad, the golden angle: directions tried one after another spread evenly
-_NOWHERE = 1e160  # m: its square overflows, so a sphere there is at distance inf
 
 
 def _candidates() -> NDArray[np.float64]:
@@ -50,6 +69,103 @@ def _candidates() -> NDArray[np.float64]:
 
 
 CANDIDATES = _candidates()
+
+
+class GuardQuery(NamedTuple):
+    """What the shield checks, an entry a row."""
+
+    rows: np.ndarray  # (n,) dtype `ROW`: state, memory, reference in force and goal
+    proposed: NDArray[np.float64]  # (n, 4) references, m and rad
+    spheres: NDArray[np.float64]  # (n, 4 M) known ones, unused ones `NOWHERE`
+    sent: NDArray[np.float64]  # (n, 4) references to fly, written
+    held: NDArray[np.float64]  # (n, 4) hovers verified last, updated
+    choice: NDArray[np.int64]  # (n,) 0: as proposed, k: candidate k, HELD or RETREAT; written
+
+
+@inlined
+def _keep_near(spheres, s, near):
+    """Copy the spheres near a place to the front of `near`; return how many they are."""
+    count = 0
+    for j in range(spheres.size // BODY):
+        body = gather(spheres, BODY * j, 0, 1, Pose)
+        if segment_distance((s.x, s.y, s.z), (s.x, s.y, s.z), body) <= _NEAR:
+            scatter(near, BODY * count, 0, 1, body)
+            count += 1
+    return count
+
+
+@inlined
+def _candidate(proposed, s, step, w):
+    """Return the reference that a step (scale, turn, lift) makes of the proposed one, for a vehicle at s."""
+    scale, (sine, cosine), lift = step[0], sincos(step[1]), step[2]
+    dx, dy, dz = proposed.x - s.x, proposed.y - s.y, proposed.z - s.z
+    rx = inside(s.x + scale * (cosine * dx - sine * dy), w.x_min, w.x_max)
+    ry = inside(s.y + scale * (sine * dx + cosine * dy), w.y_min, w.y_max)
+    return rx, ry, inside(s.z + scale * dz + lift, w.z_min, w.z_max), proposed.psi
+
+
+@inlined
+def _put(out, n, reference):
+    scatter(pointer(out), 4 * n, 0, 1, Pose(reference[0], reference[1], reference[2], reference[3]))
+
+
+@kernel
+def guard(query, rollout, envelope, candidates, scratch):
+    """Check every row's reference and replace it where it is not safe.
+
+    Args:
+        query: `GuardQuery`.
+        rollout: `Rollout.memory`, with room for M spheres.
+        envelope: packed `Envelope`.
+        candidates: (k, 3), see `CANDIDATES`.
+        scratch: two vessels.
+    """
+    all_lane = lane_of(rollout)
+    world, radius = world_of(all_lane.values), vehicle_of(all_lane.values).radius
+    limits = view(envelope, 0, Envelope)
+    for n in range(query.rows.size):
+        row = query.rows[n]
+        vessel, s = pointer(row), state_of(pointer(row))
+        count = _keep_near(query.spheres[n], s, all_lane.obstacles)
+        lane = Lane(
+            all_lane.address,
+            all_lane.ticks,
+            all_lane.values,
+            all_lane.block,
+            all_lane.obstacles,
+            all_lane.closest,
+            count,
+        )
+        margin = margin_left(MARGIN, vessel, lane, radius)
+        check = Check(
+            lane,
+            view(row.goal, 0, Point),
+            view(vessel, 0, Point),
+            world,
+            limits,
+            radius,
+            margin,
+            lane.ticks * TICK,
+            pointer(scratch),
+        )
+        proposed = gather(pointer(query.proposed), 4 * n, 0, 1, Pose)
+        query.choice[n] = HELD
+        for k in range(candidates.shape[0] + 1):
+            wanted = (proposed.x, proposed.y, proposed.z, proposed.psi)
+            if k > 0:
+                wanted = _candidate(proposed, s, candidates[k - 1], world)
+            reference = single(wanted[0], wanted[1], wanted[2], wanted[3])
+            safe, hover = verify(check, vessel, reference)
+            if safe:
+                query.choice[n] = k
+                _put(query.sent, n, reference)
+                _put(query.held, n, hover)
+                break
+        if query.choice[n] == HELD:
+            held = gather(pointer(query.held), 4 * n, 0, 1, Pose)
+            query.choice[n], reference = goes_on(check, vessel, (held.x, held.y, held.z, held.psi))
+            _put(query.sent, n, reference)
+            _put(query.held, n, reference)
 
 
 class ShieldState(NamedTuple):
@@ -70,23 +186,27 @@ class Shield:
 
     Args:
         policy: anything with Stable-Baselines3's `predict` on raw observations: agent, planner, or your own.
-        simulation: model, world and period to check with.
+        belief: the `Belief`, or any model, to check with.
     """
 
-    def __init__(self, policy: Any, simulation: Simulation) -> None:
+    def __init__(self, policy: Any, belief: Belief | Any) -> None:
         """Make the working storage."""
         self.policy = policy
-        self.simulation = simulation
-        self._block, self._scratch = new_block(1), new_rows(2)
-        self._log = np.zeros((1, LOGGED_CROSSINGS, len(CROSSING_FIELDS)))
-        world = simulation.world
+        self.belief = Belief.of(belief)
+        self.simulation = self.belief.simulation()
+        self._envelope, self._scratch = packed(self.belief.envelope), np.zeros(2 * VESSEL)
+        world = self.belief.world
         self._low = np.array([*world.lower, -np.pi], np.float32).astype(np.float64)
         self._high = np.array([*world.upper, np.pi], np.float32).astype(np.float64)
 
     @classmethod
-    def for_env(cls, policy: Any, env: Any) -> Self:
-        """Shield a policy for a HyDrone environment or a vector of them; TypeError for anything else."""
-        return cls(policy, simulation_of(env))
+    def for_env(cls, policy: Any, env: Any, *, belief: Belief | Literal["truth"] | None = None) -> Self:
+        """Shield a policy for a HyDrone environment or a vector of them.
+
+        `belief` is what to check with instead of the nominal model, see `planners.belief.belief_of`. Raises TypeError
+        for any other environment.
+        """
+        return cls(policy, belief_of(env, belief))
 
     def predict(
         self,
@@ -158,25 +278,18 @@ class Shield:
         for key in ("state", "integral", "reference", "goal"):
             rows[key] = np.reshape(observation[key], rows[key].shape)
         spheres = np.array(observation["obstacles"], np.float64).reshape(count, -1, 4)
-        spheres[spheres[:, :, 3] <= 0.0] = (_NOWHERE, 0.0, 0.0, 0.0)
-        sent, held = np.empty((count, 4)), np.array(held, np.float64)
-        choice = np.empty(count, np.int64)
-        guard(
-            rows,
-            np.minimum(np.maximum(proposed, self._low), self._high),
-            CANDIDATES,
-            spheres.reshape(count, -1),
-            self.simulation.values,
-            self.simulation.ticks,
-            self._scratch,
-            np.empty(spheres.shape[1]),
-            self._block,
-            self._log,
-            sent,
-            held,
-            choice,
+        spheres[spheres[:, :, 3] <= 0.0] = (NOWHERE, 0.0, 0.0, 0.0)
+        query = GuardQuery(
+            rows=rows,
+            proposed=np.minimum(np.maximum(proposed, self._low), self._high),
+            spheres=spheres.reshape(count, -1),
+            sent=np.empty((count, 4)),
+            held=np.array(held, np.float64),
+            choice=np.empty(count, np.int64),
         )
-        return sent, held, choice
+        rollout = Rollout(self.simulation, np.empty((spheres.shape[1], 4))).memory
+        guard(query, rollout, self._envelope, CANDIDATES, self._scratch)
+        return query.sent, query.held, query.choice
 
 
 def _watch(
@@ -205,6 +318,6 @@ def _beside(
     beside[:, 0] = place[:, 0] + _STEP_ASIDE * np.cos(angle)
     beside[:, 1] = place[:, 1] + _STEP_ASIDE * np.sin(angle)
     between = np.abs(place[:, 2]) < min(AIR_GATE, WATER_GATE)
-    air = np.where(between, detours % 2 == 0, place[:, 2] > 0.0)
+    air = np.where(between, detours % 2 == 0, in_air(place[:, 2]))
     beside[:, 2] = np.where(air, np.maximum(place[:, 2], AIR_GATE), np.minimum(place[:, 2], -WATER_GATE))
     return beside

@@ -1,218 +1,223 @@
-"""The check behind the shield, as kernels: can a reference be followed to rest, and if not, what can instead."""
+"""The one stop check: can a reference be followed to rest in known free space, and if not, what can instead.
+
+CL-RRT, the shield, and training behind the shield ask here, with one set of constants. A stop is verified when the
+vehicle comes to rest: slow, level, outside the transition zone, and under water not carried into anything by what is
+left of its sway. Rest under water does not last, so what is held is verified again, and given up for a retreat when it
+is not safe any more.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hydrone_gym._jit import inlined, kernel, routine
+from hydrone_gym._jit import inlined, routine
+from hydrone_gym._memory import shifted, view
+from hydrone_gym.control.reference import clamp
+from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.advance import advance
-from hydrone_gym.simulation.model import unpack_model
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rows import load_row, store_row
-from hydrone_gym.world.bodies import segment_distance
-from planners.cl_rrt.references import AIR_GATE, WATER_GATE, hover_reference, inside
+from hydrone_gym.simulation.rollout import Lane, propagate
+from hydrone_gym.simulation.storage import REFERENCE, VESSEL, Pose
+from hydrone_gym.surface import is_air
 from planners.clearance import clearance_between
 
-HELD = -1  # choice: no candidate was safe, what was verified last goes on
-RETREAT = -2  # choice: nor was that any more, the vehicle turns under water and swims against its drift
-MARGIN = 0.05  # m of clearance that checked motion keeps
-LOOK_AHEAD = 12  # periods that a hover is simulated for
-RETREAT_AHEAD = 20  # periods that a retreat is simulated for: a quarter turn takes ten
+AIR_GATE = 1.1  # m above the surface: crossings begin or end here; from 1.4 m the exit would lie beyond sensing
+WATER_GATE = 1.0  # m below the surface
+
+HELD = -1  # what was verified last goes on
+RETREAT = -2  # nor is that safe any more: the vehicle turns under water and swims against its drift
+MARGIN = 0.05  # m of clearance that a stop keeps: what an estimate of the position may be wrong by
+GIVE = 0.002  # m: how much nearer than now a vehicle within the margin may come; more would add up
+LEAST_MARGIN = 0.005  # m
+LOOK_AHEAD = 6.0  # s that a stop is simulated for: from 2 m/s in air it takes 4, and out of the zone upwards 5
+_RETREAT_AHEAD = 10.0  # s that a retreat is simulated for: a quarter turn takes five
 _RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
 _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
-_NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
-_DRIFT = 12.0  # s: what is left of sway at the end of a stop in water goes on for a while
-_GIVE = 0.002  # m: how much nearer than now a vehicle within the margin may come; more would add up
-_LEAST = 0.001  # m
+_DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
+_WALL = 0.1  # m: references keep this far inside the box
 
 
-@routine
-def _follow(row, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, model, block, log):
-    """Propagate a row one period toward a reference; return (whether that is safe, whether it arrives).
+class Check(NamedTuple):
+    """What every stop of a vehicle is checked with; pointers and numbers, made in a kernel."""
 
-    Args:
-        row: record of dtype `ROW`, changed in place.
-        eye: (3,) where obstacles were sensed from, m.
-        rx, ry, rz, psi: the reference, m and rad.
-        spheres, closest, count: flat known spheres of one lane, as in `advance`.
-        margin: clearance to keep, m.
-        ticks: of a period.
-        model: `Model`.
-        block, log: working storage of one lane.
+    lane: Lane
+    goal: Any  # view of a `Point`
+    eye: Any  # the same: where the obstacles were last sensed from
+    world: Any  # view of a `WorldParams`
+    envelope: Any  # view of an `Envelope`
+    radius: float  # of the vehicle, m
+    margin: float  # clearance to keep, m
+    period: float  # s
+    scratch: Any  # pointer to room for two vessels
+
+
+@inlined
+def inside(value, low, high):
+    """Keep a coordinate of a reference inside the box."""
+    return clamp(value, low + _WALL, high - _WALL)
+
+
+@inlined
+def single(x, y, z, psi):
+    """Round a reference to the precision of the action space: what is checked is what is flown."""
+    return (
+        np.float64(np.float32(x)),
+        np.float64(np.float32(y)),
+        np.float64(np.float32(z)),
+        np.float64(np.float32(psi)),
+    )
+
+
+@inlined
+def state_of(vessel):
+    """Look at the `State` of a vessel."""
+    return view(vessel, 0, State)
+
+
+@inlined
+def reference_of(vessel):
+    """Read the reference in force of a vessel, (x, y, z, psi)."""
+    r = view(vessel, REFERENCE, Pose)
+    return r.x, r.y, r.z, r.psi
+
+
+@inlined
+def copy_vessel(source, target):
+    """Copy a vehicle with its reference."""
+    for k in range(VESSEL):
+        target[k] = source[k]
+
+
+@inlined
+def margin_left(wanted, vessel, lane, radius):
+    """The margin (m) to keep now: the wanted one, or what a vehicle already nearer to an obstacle has left.
+
+    Without this a vehicle that drifted or stopped within the margin could never move again.
     """
-    b, w = block[0], model.world
-    row.ticks, row.clearance, row.outcome, row.crossings = 0.0, np.inf, RUNNING, 0.0
-    load_row(b, 0, row, (rx, ry, rz, psi))
-    advance(block, log, spheres, closest, count, model, 0, ticks, ticks)
-    store_row(b, 0, row)
-    row.reference[0], row.reference[1], row.reference[2], row.reference[3] = rx, ry, rz, psi
-    smooth = True
-    for slot in range(min(int(row.crossings), log.shape[1])):
-        smooth = smooth and log[0, slot, 2] <= w.rough_speed and np.cos(log[0, slot, 3]) >= w.rough_cos_tilt
-    s = row.state
-    dx, dy, dz = s[0] - eye[0], s[1] - eye[1], s[2] - eye[2]
-    reach = w.sensor_range - model.vehicle.radius
-    sensed = dx * dx + dy * dy + dz * dz <= reach * reach
-    arrives = row.outcome == GOAL
-    return (row.outcome == RUNNING or arrives) and row.clearance >= margin and smooth and sensed, arrives
+    p = state_of(vessel)
+    left = clearance_between((p.x, p.y, p.z), (p.x, p.y, p.z), lane, 0, radius) - GIVE
+    return max(min(wanted, left), LEAST_MARGIN)
 
 
 @inlined
-def _near(x, y, z, spheres, near):
-    """Copy the spheres near a point to the front of `near`; return how many they are."""
-    count = 0
-    for j in range(spheres.size // 4):
-        k = 4 * j
-        body = (spheres[k], spheres[k + 1], spheres[k + 2], spheres[k + 3])
-        if segment_distance((x, y, z), (x, y, z), body) <= _NEAR:
-            for c in range(4):
-                near[4 * count + c] = spheres[k + c]
-            count += 1
-    return count
+def sensed(check, vessel):
+    """Whether a vehicle is in space sensed from the eye: nothing unknown can be in the way there."""
+    s, eye = state_of(vessel), check.eye
+    dx, dy, dz = s.x - eye.x, s.y - eye.y, s.z - eye.z
+    reach = check.world.sensor_range - check.radius
+    return dx * dx + dy * dy + dz * dz <= reach * reach
 
 
 @inlined
-def _single(value):
-    """Round to the precision of the action space: what is checked is what is flown."""
-    return float(np.float32(value))
-
-
-@inlined
-def _copy(source, destination):
-    """Copy what a stop begins from, field by field: record assignment compiles slowly."""
-    for c in range(12):
-        destination.state[c] = source.state[c]
-    for c in range(4):
-        destination.integral[c], destination.reference[c] = source.integral[c], source.reference[c]
-    for c in range(3):
-        destination.goal[c] = source.goal[c]
-
-
-@inlined
-def _resting(s, hover, model):
-    """Whether a state that a hover reference has been flown to for a period stays: slow, level, not about to drive."""
-    dx, dy, hold = hover[0] - s[0], hover[1] - s[1], model.water_gains.hold_radius
-    slow = s[6] * s[6] + s[7] * s[7] + s[8] * s[8] < _REST * _REST
-    level = s[3] * s[3] + s[4] * s[4] + s[9] * s[9] + s[10] * s[10] < _LEVEL * _LEVEL
-    return slow and level and abs(s[2]) > model.world.zone and (s[2] > 0.0 or dx * dx + dy * dy < hold * hold)
+def hover_reference(check, vessel):
+    """Anchor a hover at the vehicle, a little ahead along its velocity: the safety action."""
+    w, s = check.world, state_of(vessel)
+    air = is_air(s.z)
+    ahead = check.envelope.ahead_air if air else check.envelope.ahead_water
+    psi = view(vessel, REFERENCE, Pose).psi if air else s.psi
+    z = s.z + ahead * s.vz
+    z = max(z, AIR_GATE) if air else min(z, -WATER_GATE)
+    x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
+    return single(x, y, inside(z, w.z_min, w.z_max), psi)
 
 
 @routine
-def _rests(row, eye, hover, periods, spheres, closest, count, margin, ticks, model, block, log):
-    """Whether a row comes to rest safely at a hover reference (4,) within periods; the row is changed in place."""
-    s = row.state
-    for _ in range(periods):
-        hx, hy, hz, heading = hover[0], hover[1], hover[2], hover[3]
-        safe, arrives = _follow(
-            row, eye, hx, hy, hz, heading, spheres, closest, count, margin, ticks, model, block, log
-        )
+def follow(check, start, end, reference):
+    """Fly a vessel toward a reference for one period; return (whether that is safe, whether it arrives)."""
+    flown = propagate(check.lane, start, end, check.goal, reference)
+    smooth = flown.lateral_speed <= check.world.rough_speed and flown.cos_tilt >= check.world.rough_cos_tilt
+    arrives = flown.outcome == GOAL
+    on = flown.outcome == RUNNING or arrives
+    return on and flown.clearance >= check.margin and smooth and sensed(check, end), arrives
+
+
+@inlined
+def _resting(check, s, hover):
+    """Whether a state that a hover has been flown to for a period stays: slow, level, not about to drive."""
+    dx, dy, hold = hover[0] - s.x, hover[1] - s.y, check.envelope.hold_radius
+    slow = s.vx * s.vx + s.vy * s.vy + s.vz * s.vz < _REST * _REST
+    level = s.phi * s.phi + s.theta * s.theta + s.p * s.p + s.q * s.q < _LEVEL * _LEVEL
+    return slow and level and abs(s.z) > check.world.zone and (is_air(s.z) or dx * dx + dy * dy < hold * hold)
+
+
+@routine
+def rests(check, vessel, hover, seconds):
+    """Whether a vessel comes to rest safely at a hover within some time; it is flown in place."""
+    resting = False
+    for _ in range(int(np.ceil(seconds / check.period))):
+        safe, arrives = follow(check, vessel, vessel, hover)
         if arrives or not safe:
             return safe
-        if _resting(s, hover, model):
+        resting = _resting(check, state_of(vessel), hover)
+        if resting:
             break
-    if s[2] < 0.0:
-        x, y = s[0] + _DRIFT * s[6], s[1] + _DRIFT * s[7]
-        w = model.world
-        if not (w.x_min < x < w.x_max and w.y_min < y < w.y_max):
-            return False
-        return clearance_between(s, (x, y, s[2]), spheres, 0, count, model.vehicle.radius) >= margin
-    return True
+    s, w = state_of(vessel), check.world
+    if is_air(s.z):
+        return resting
+    x, y = s.x + _DRIFT * s.vx, s.y + _DRIFT * s.vy
+    if not (w.x_min < x < w.x_max and w.y_min < y < w.y_max):
+        return False
+    return clearance_between((s.x, s.y, s.z), (x, y, s.z), check.lane, 0, check.radius) >= check.margin
 
 
 @routine
-def _verify(row, scratch, rx, ry, rz, psi, hover, spheres, closest, count, margin, ticks, model, block, log):
-    """Whether a reference can be followed to rest; writes the hover that does it to `hover` (4,).
+def can_stop(check, vessel):
+    """Return (whether a vessel can hover to rest, the hover that does it); the vessel is left as it is.
 
     Near the surface there are two ways to stop: go back to the side one is on, or finish the crossing.
     """
-    eye, end, spare = row.state, scratch[0], scratch[1]
-    _copy(row, end)
-    safe, arrives = _follow(end, eye, rx, ry, rz, psi, spheres, closest, count, margin, ticks, model, block, log)
-    hx, hy, hz, heading = hover_reference(end, model)
-    hover[0], hover[1], hover[2], hover[3] = _single(hx), _single(hy), _single(hz), _single(heading)
-    if arrives or not safe:
-        return safe
-    _copy(end, spare)
-    if _rests(spare, eye, hover, LOOK_AHEAD, spheres, closest, count, margin, ticks, model, block, log):
-        return True
-    if abs(end.state[2]) > AIR_GATE:
-        return False
-    hover[2] = _single(AIR_GATE if hz < 0.0 else -WATER_GATE)
-    return _rests(end, eye, hover, LOOK_AHEAD, spheres, closest, count, margin, ticks, model, block, log)
+    spare, hover = shifted(check.scratch, VESSEL), hover_reference(check, vessel)
+    copy_vessel(vessel, spare)
+    if rests(check, spare, hover, LOOK_AHEAD):
+        return True, hover
+    if abs(state_of(vessel).z) > AIR_GATE:
+        return False, hover
+    hover = single(hover[0], hover[1], -WATER_GATE if is_air(hover[2]) else AIR_GATE, hover[3])
+    copy_vessel(vessel, spare)
+    return rests(check, spare, hover, LOOK_AHEAD), hover
 
 
 @routine
-def _goes_on(row, scratch, held, spheres, closest, count, margin, ticks, model, block, log):
-    """Return HELD or RETREAT where no candidate verifies; a retreat is written to `held` (4,).
+def verify(check, vessel, reference):
+    """Return (whether a reference can be followed to rest, the hover that does it); the vessel is left as it is."""
+    end = check.scratch
+    safe, arrives = follow(check, vessel, end, reference)
+    if arrives or not safe:
+        return safe, hover_reference(check, end)
+    return can_stop(check, end)
+
+
+@routine
+def goes_on(check, vessel, held):
+    """Return (HELD or RETREAT, the reference to go on with) for a vehicle that holds a reference.
 
     Under water a hover drifts, so what was safe when it was verified may no longer be; then the vehicle swims against
     the drift, as nearly as is free. While it turns it may come nearer to spheres than the margin.
     """
-    s, end = row.state, scratch[0]
-    if s[2] > 0.0:
-        return HELD
-    _copy(row, end)
-    if _rests(end, s, held, RETREAT_AHEAD, spheres, closest, count, margin, ticks, model, block, log):
-        return HELD
-    w, back = model.world, np.empty(4)
-    back[2], back[3] = _single(inside(min(s[2], -WATER_GATE), w.z_min, w.z_max)), _single(s[5])
-    scale = -_RETREAT / max(np.sqrt(s[6] * s[6] + s[7] * s[7]), 1e-9)
+    s, w, spare = state_of(vessel), check.world, shifted(check.scratch, VESSEL)
+    if is_air(s.z):
+        return HELD, held
+    copy_vessel(vessel, spare)
+    if rests(check, spare, held, _RETREAT_AHEAD):
+        return HELD, held
+    near = Check(
+        check.lane, check.goal, check.eye, w, check.envelope, check.radius, LEAST_MARGIN, check.period, check.scratch
+    )
+    scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)
     for turn in _TURNS:
         sine, cosine = sincos(turn)
-        back[0] = _single(inside(s[0] + scale * (cosine * s[6] - sine * s[7]), w.x_min, w.x_max))
-        back[1] = _single(inside(s[1] + scale * (sine * s[6] + cosine * s[7]), w.y_min, w.y_max))
-        _copy(row, end)
-        if _rests(end, s, back, RETREAT_AHEAD, spheres, closest, count, _LEAST, ticks, model, block, log):
-            for c in range(4):
-                held[c] = back[c]
-            return RETREAT
-    return HELD
+        back = single(
+            inside(s.x + scale * (cosine * s.vx - sine * s.vy), w.x_min, w.x_max),
+            inside(s.y + scale * (sine * s.vx + cosine * s.vy), w.y_min, w.y_max),
+            inside(min(s.z, -WATER_GATE), w.z_min, w.z_max),
+            s.psi,
+        )
+        copy_vessel(vessel, spare)
+        if rests(near, spare, back, _RETREAT_AHEAD):
+            return RETREAT, back
+    return HELD, held
 
 
-@kernel
-def guard(rows, proposed, candidates, spheres, values, ticks, scratch, closest, block, log, sent, held, choice):
-    """Check every row's reference and replace it where it is not safe.
-
-    Args:
-        rows: (n,) dtype `ROW`: state, memory, reference in force and goal.
-        proposed: (n, 4) references, m and rad.
-        candidates: (k, 3), see `CANDIDATES`.
-        spheres: (n, 4 M) known spheres, unused ones far away.
-        values: packed `Model`.
-        ticks: of a period.
-        scratch: (2,) dtype `ROW`.
-        closest: (M,) working storage; block, log: that of one lane.
-        sent: (n, 4) references to fly, written.
-        held: (n, 4) hovers verified last, updated.
-        choice: (n,) 0: as proposed, k: candidate k, HELD or RETREAT; written.
-    """
-    model = unpack_model(values)
-    w = model.world
-    hover, near = np.empty(4), np.empty(spheres.shape[1])
-    for n in range(rows.size):
-        row, s = rows[n], rows[n].state
-        count = _near(s[0], s[1], s[2], spheres[n], near)
-        left = clearance_between(s, s, near, 0, count, model.vehicle.radius) - _GIVE
-        margin = max(min(MARGIN, left), _LEAST)
-        dx, dy, dz = proposed[n, 0] - s[0], proposed[n, 1] - s[1], proposed[n, 2] - s[2]
-        choice[n] = HELD
-        for k in range(candidates.shape[0] + 1):
-            rx, ry, rz, psi = proposed[n, 0], proposed[n, 1], proposed[n, 2], proposed[n, 3]
-            if k > 0:
-                scale, lift = candidates[k - 1, 0], candidates[k - 1, 2]
-                sine, cosine = sincos(candidates[k - 1, 1])
-                rx = inside(s[0] + scale * (cosine * dx - sine * dy), w.x_min, w.x_max)
-                ry = inside(s[1] + scale * (sine * dx + cosine * dy), w.y_min, w.y_max)
-                rz = inside(s[2] + scale * dz + lift, w.z_min, w.z_max)
-            rx, ry, rz, psi = _single(rx), _single(ry), _single(rz), _single(psi)
-            if _verify(row, scratch, rx, ry, rz, psi, hover, near, closest, count, margin, ticks, model, block, log):
-                choice[n] = k
-                sent[n, 0], sent[n, 1], sent[n, 2], sent[n, 3] = rx, ry, rz, psi
-                for c in range(4):
-                    held[n, c] = hover[c]
-                break
-        if choice[n] == HELD:
-            choice[n] = _goes_on(row, scratch, held[n], near, closest, count, margin, ticks, model, block, log)
-            for c in range(4):
-                sent[n, c] = held[n, c]
+__all__ = ["HELD", "RETREAT", "Check", "can_stop", "follow", "goes_on", "rests", "verify"]

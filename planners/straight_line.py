@@ -1,14 +1,15 @@
 """The floor that every planner must beat: straight legs, a vertical crossing, and no eye for obstacles."""
 
 import math
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import GATE
-from planners.policy import Known, PlannerPolicy, simulation_of
+from hydrone_gym.surface import in_air
+from planners.belief import Belief
+from planners.policy import Known, PlannerPolicy
 
 COLUMN_RADIUS = 0.2  # m: how far from the column's axis a water entry may begin
 REST_SPEED = 0.1  # m/s: lateral speed below which a water entry may begin
@@ -24,25 +25,20 @@ class StraightLine(PlannerPolicy):
     away from a vehicle that lags. The policy needs no memory: its state is a tuple of None.
 
     Args:
-        simulation: supplies the speed limits, the period and the transition zone.
+        belief: supplies the speed limits, the period and the transition zone.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, belief: Belief | Any) -> None:
         """Read the speed limits and the period."""
-        gains = simulation.vehicle.air_gains
-        self._cruise = simulation.period * gains.speed_limit
-        self._climb = simulation.period * gains.vertical_speed_limit
-        self._zone = simulation.world.zone
-        self._gate = max(GATE, simulation.world.zone + 0.3)
-
-    @classmethod
-    def for_env(cls, env: Any) -> Self:
-        """Return the policy for a HyDrone environment or a vector of them; TypeError for anything else."""
-        return cls(simulation_of(env))
+        model = Belief.of(belief)
+        self._cruise = model.period * model.envelope.cruise
+        self._climb = model.period * model.envelope.climb
+        self._zone = model.world.zone
+        self._gate = max(GATE, model.world.zone + 0.3)
 
     def act(self, now: Known, memory: Any) -> tuple[NDArray[np.float64], None]:
         """Return the reference (4,) for the next period (m, m, m, rad) and no memory."""
-        if now.state[2] > 0.0:
+        if in_air(now.state[2]):
             return self._in_air(now), None
         return self._in_water(now), None
 
@@ -50,7 +46,7 @@ class StraightLine(PlannerPolicy):
         """Reference above the surface: straight to the goal, or to the gate over it and then down."""
         position, goal = now.state[:3], now.goal
         heading = now.reference[3]  # free in air: hold it
-        if goal[2] > 0.0:
+        if in_air(goal[2]):
             # a vehicle that has just left the water clears the zone before it moves sideways
             aim = goal if position[2] > self._zone else np.array([position[0], position[1], self._gate])
             return self._ahead(position, aim, heading)
@@ -76,7 +72,7 @@ class StraightLine(PlannerPolicy):
         """Reference under water: straight to the goal, or straight up where the vehicle is."""
         position, goal = now.state[:3], now.goal
         heading = now.state[5]  # the law of sight steers; the vehicle must not turn when it comes out
-        if goal[2] > 0.0:
+        if in_air(goal[2]):
             return np.array([position[0], position[1], self._gate, heading])
         offset = goal - position
         share = max(float(np.linalg.norm(offset)) / SWIM_LEAD, 1.0)

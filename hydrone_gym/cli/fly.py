@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from tqdm import tqdm
 
 from hydrone_gym.cli.missions import MissionOptions, Prepared
@@ -75,21 +74,9 @@ def _draw_tree(mission: Prepared, folder: Path) -> list[Path]:
 
     everything = {**mission.observation, "obstacles": mission.scenario.obstacles}
     tree = grow_tree(everything, _TREE_ITERATIONS)
-    path = tree.edges[tree.path]
-    solution = np.concatenate((path[:1, 0], path[:, 1])) if len(path) else None
     world = mission.env.get_wrapper_attr("world")
     title = f"{mission.name.replace('-', ' ').capitalize()}: tree of {len(tree.edges)} edges, every obstacle known"
-    figure = plot_tree(
-        tree.edges,
-        tree.air,
-        mission.scenario.start[:3],
-        mission.scenario.goal,
-        mission.scenario.obstacles,
-        solution=solution,
-        lower=world.lower,
-        upper=world.upper,
-        title=title,
-    )
+    figure = plot_tree(tree, mission.scenario, world, title=title)
     return save_figure(figure, folder / f"{mission.name}-tree")
 
 

@@ -1,9 +1,8 @@
-"""The paper's control laws: from state, reference and memory to four rotor speeds, every 10 ms.
+"""Control: from state, reference and memory to four rotor speeds, every 10 ms.
 
-`reference` holds what a law tracks (a moving point and a heading) and the controller's memory; `air` holds altitude,
-attitude and position (eqs. 5-8), with commanded velocity limited so that any reference is safe to send; `water` holds
-depth, pitch, heading and surge (eqs. 13-16), mixed in newtons, with driving both ways and holding still; `law` picks
-the medium's law, applies the rotor limits and stops the memory from winding up. Inside the transition zone both laws
-hold still laterally (vertical mode). Gains live in `hydrone_gym.vehicle`; docs/deviations.md says where the laws leave
-the paper.
+`reference` holds what a law looks at (an instant, a moving reference) and its memory; `law` says what a law is, applies
+the rotor limits and stops the memory from winding up; `paper` is the paper's law (eqs. 5-8, 13-16); `laws` lists the
+laws there are; `envelope` is what a law publishes of itself, which is all that anybody else reads. Inside the
+transition zone laws hold still laterally (vertical mode). Gains live in `hydrone_gym.vehicle`; docs/deviations.md says
+where the law leaves the paper.
 """

@@ -1,8 +1,10 @@
-"""The reference a controller tracks and its memory (paper's r, and the integrals of eqs. 6, 7, 14, 15)."""
+"""What a control law looks at and what it remembers (paper's r, and the integrals of eqs. 6, 7, 14, 15)."""
 
 from typing import NamedTuple
 
 from hydrone_gym._jit import inlined
+from hydrone_gym.physics.kinematics import Attitude, State
+from hydrone_gym.physics.parameters import MediumParams
 
 
 class Reference(NamedTuple):
@@ -24,6 +26,18 @@ class Integral(NamedTuple):
     phi: float
     theta: float
     psi: float
+
+
+class Instant(NamedTuple):
+    """Everything a law looks at."""
+
+    state: State
+    attitude: Attitude
+    rates: tuple  # of the Euler angles, rad/s
+    reference: Reference
+    vertical: bool  # whether the vehicle has to hold still laterally, in the transition zone
+    air: bool
+    medium: MediumParams
 
 
 @inlined

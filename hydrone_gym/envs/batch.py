@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.task import REPORT, begin_rows, new_episodes, pack_task, settle
-from hydrone_gym.simulation.block import LANES
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import LANES
 from hydrone_gym.world.generator import draw, first_numbers, prepare
 from hydrone_gym.world.placement import place_many
 from hydrone_gym.world.scenario import Scenario

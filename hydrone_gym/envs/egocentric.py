@@ -56,8 +56,8 @@ from hydrone_gym.envs.relative import (
     unpack_egocentric,
 )
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import new_rows
 from hydrone_gym.simulation.time_to_go import time_to_go
 from hydrone_gym.surface import is_air
 

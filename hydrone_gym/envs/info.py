@@ -1,5 +1,6 @@
 """The `info` of a step: plain Python numbers, new with every call."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,8 +8,8 @@ import numpy as np
 
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import REPORT
-from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS
 from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.storage import CROSSING_FIELDS, LOGGED_CROSSINGS
 
 _OUTCOMES = tuple(Outcome)
 _OUTCOME = REPORT.index("outcome")
@@ -44,6 +45,7 @@ def crossings_of(log: np.ndarray, count: int) -> list[dict[str, Any]]:
     for entry in log[: min(count, LOGGED_CROSSINGS)].tolist():
         crossing = dict(zip(CROSSING_FIELDS, entry, strict=True))
         crossing["direction"] = "exit" if crossing["direction"] > 0.0 else "entry"
+        crossing["tilt"] = math.acos(crossing.pop("cos_tilt"))
         crossings.append(crossing)
     return crossings
 

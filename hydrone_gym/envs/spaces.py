@@ -5,7 +5,7 @@ import math
 import numpy as np
 from gymnasium import spaces
 
-from hydrone_gym.control.envelope import envelope_of
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.simulation.advance import RATE_BOUND, SPEED_BOUND, TICK
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World

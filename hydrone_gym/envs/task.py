@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym.control.envelope import envelope_of
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.envs.reward import TERMS, write_reward
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
-from hydrone_gym.simulation.rows import new_rows
+from hydrone_gym.simulation.storage import new_rows
 from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.bodies import segment_distance

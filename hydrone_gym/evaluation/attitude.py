@@ -1,53 +1,51 @@
-"""The attitude that the control laws ask for along a flight, which a policy that sends positions never sees."""
+"""The attitude that a control law asks for along a flight, which a policy that sends positions never sees."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import kernel
-from hydrone_gym.control.air import tilt_reference
-from hydrone_gym.control.reference import Reference
-from hydrone_gym.control.water import surge_and_heading
+from hydrone_gym._memory import gather
+from hydrone_gym.control.law import tracked
+from hydrone_gym.control.laws import named_law
+from hydrone_gym.control.reference import Instant, Reference
 from hydrone_gym.evaluation.flight import Trace
-from hydrone_gym.physics.kinematics import State, attitude_of
-from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.physics.dynamics import medium_at
+from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
 from hydrone_gym.simulation.simulation import TICK, Simulation
+from hydrone_gym.simulation.storage import vehicle_of, world_of
 from hydrone_gym.surface import is_air
 
 
 @kernel
 def _write_references(
-    states: NDArray, moving: NDArray, values: NDArray[np.float64], tick: float, out: NDArray[np.float64]
+    states: NDArray, moving: NDArray, values: NDArray[np.float64], gains: Any, out: NDArray[np.float64]
 ) -> None:
     """Write the attitude reference (φ, θ, ψ) of every sample; NaN where a law has none.
 
-    Shapes: states (N, 12), moving (N, 4), values packed `Model`, out (N, 3); tick in s.
+    Shapes: states (N, 12), moving (N, 4), values packed `Model`, gains of the law, out (N, 3).
     """
-    model = unpack_model(values)
-    w = model.world
+    vehicle, world = vehicle_of(values), world_of(values)
     for n in range(states.shape[0]):
-        s = states[n]
-        state = State(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11])
+        state = gather(states[n], 0, 0, 1, State)
         # the reference moves evenly within a period; at rest before the first
         old, new = moving[max(n - 1, 0)], moving[n]
-        vx, vy, vz = (new[0] - old[0]) / tick, (new[1] - old[1]) / tick, (new[2] - old[2]) / tick
+        vx, vy, vz = (new[0] - old[0]) / TICK, (new[1] - old[1]) / TICK, (new[2] - old[2]) / TICK
         reference = Reference(new[0], new[1], new[2], new[3], vx, vy, vz)
-        attitude = attitude_of(state)
-        vertical = abs(state.z) <= w.zone and w.vertical_mode > 0.0
-        if is_air(state.z):
-            phi, theta = tilt_reference(state, attitude, reference, vertical, model.air_gains)
-            out[n, 0], out[n, 1], out[n, 2] = phi, theta, reference.psi
-        else:
-            _, error, drive = surge_and_heading(state, attitude, reference, vertical, model.water_gains)
-            out[n, 0], out[n, 1] = np.nan, 0.0
-            out[n, 2] = state.psi + error if drive else np.nan
+        attitude, air = attitude_of(state), is_air(state.z)
+        rates = euler_rates(attitude, state.p, state.q, state.r)
+        vertical = abs(state.z) <= world.zone and world.vertical_mode > 0.0
+        now = Instant(state, attitude, rates, reference, vertical, air, medium_at(vehicle, air))
+        out[n, 0], out[n, 1], out[n, 2] = tracked(gains, now)
 
 
 def attitude_references(simulation: Simulation, trace: Trace) -> NDArray[np.float64]:
-    """Return roll, pitch and yaw (rad) that the control laws track at every tick of a trace, (N, 3).
+    """Return roll, pitch and yaw (rad) that the control law tracks at every tick of a trace, (N, 3).
 
-    Under water roll is free, pitch is held level and yaw is the line of sight while the vehicle drives; what a law does
-    not track is NaN.
+    What a law does not track is NaN: by the paper's law roll is free in water, and yaw while the vehicle holds still.
     """
     out = np.empty((len(trace.times), 3))
-    _write_references(trace.states, trace.references, simulation.values, TICK, out)
+    gains = named_law(simulation.law).gains_of(simulation.vehicle)
+    _write_references(trace.states, trace.references, simulation.values, gains, out)
     return out

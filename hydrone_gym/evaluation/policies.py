@@ -234,8 +234,12 @@ def _module_of(file: Path) -> Any:
 
 
 def _takes_seed(factory: Factory) -> bool:
+    """Tell whether a factory takes a seed, or hands it on as a method of a class that takes one."""
+    owner: Any = getattr(getattr(factory, "func", factory), "__self__", None)  # `func` of a functools.partial
     try:
-        return "seed" in inspect.signature(factory).parameters
+        options = inspect.signature(factory).parameters
+        hands_on = isinstance(owner, type) and any(o.kind is o.VAR_KEYWORD for o in options.values())
+        return "seed" in options or (hands_on and "seed" in inspect.signature(owner).parameters)
     except ValueError:  # some built-in callables have no signature
         return False
 

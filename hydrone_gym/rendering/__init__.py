@@ -9,5 +9,13 @@ episode. `render_size` is width and height in pixels, even, from 64 to 4096. `ca
   in small pictures; its centre, like everything else, is where it is.
 - "chase" follows the vehicle from behind; all sizes are true, and water and floor go on beyond the box.
 
-docs/rendering.md shows both and how videos are made.
+docs/rendering.md shows both and how videos are made. A module imports only from lines below its own:
+
+    what is asked for   view (environments) · video · replay (pages) · figures · histories · comparison
+    what is drawn on    frame (pictures) · window · stage (pages) · scene3d (figures)
+    with what           shapes · raycast
+    what rays meet      solids, backdrop
+    what there is       track (flights) · camera · paths · style
+
+What an obstacle looks like, each of them asks `hydrone_gym.world.bodies`.
 """

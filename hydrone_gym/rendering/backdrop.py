@@ -15,33 +15,25 @@ _SAND = (0.87, 0.81, 0.68)
 _LINE = (0.45, 0.50, 0.55)
 
 
-class Camera(NamedTuple):
-    """Where the eye is, and unit vectors to the right, up and forward; `pixel` is one pixel's width at distance 1."""
+Point = tuple[float, float, float]
 
-    ex: float
-    ey: float
-    ez: float
-    rx: float
-    ry: float
-    rz: float
-    ux: float
-    uy: float
-    uz: float
-    fx: float
-    fy: float
-    fz: float
-    pixel: float
+
+class Camera(NamedTuple):
+    """Where the eye is (m), and unit vectors to the right, up and forward."""
+
+    eye: Point
+    right: Point
+    up: Point
+    forward: Point
+    pixel: float  # width of one at distance 1
+    middle: tuple[float, float]  # of the picture, pixels
 
 
 class Box(NamedTuple):
     """The world as it is drawn (m)."""
 
-    x0: float
-    y0: float
-    z0: float
-    x1: float
-    y1: float
-    z1: float
+    lower: Point
+    upper: Point
     zone: float
     sea: float  # 1: water and floor reach to the horizon; 0: they end at the walls, which show a grid
 
@@ -58,9 +50,7 @@ class Span(NamedTuple):
     leave_axis: int
     dive: float
     rise: float
-    by_x: float
-    by_y: float
-    by_z: float
+    by: Point
 
 
 @inlined
@@ -77,28 +67,20 @@ def _cut(o, inverse, low, high):
 
 
 @inlined
-def span_of(camera, box, dx, dy, dz):
+def span_of(camera, box, d):
     """Return the `Span` of a ray from the eye."""
     reach = _SEA * box.sea
-    by_x, by_y, by_z = 1.0 / dx, 1.0 / dy, 1.0 / dz
-    x_in, x_out = _cut(camera.ex, by_x, box.x0 - reach, box.x1 + reach)
-    y_in, y_out = _cut(camera.ey, by_y, box.y0 - reach, box.y1 + reach)
-    z_in, z_out = _cut(camera.ez, by_z, box.z0, box.z1 + reach)
-    dive, rise = _cut(camera.ez, by_z, box.z0, 0.0)
+    by = 1.0 / d[0], 1.0 / d[1], 1.0 / d[2]
+    x_in, x_out = _cut(camera.eye[0], by[0], box.lower[0] - reach, box.upper[0] + reach)
+    y_in, y_out = _cut(camera.eye[1], by[1], box.lower[1] - reach, box.upper[1] + reach)
+    z_in, z_out = _cut(camera.eye[2], by[2], box.lower[2], box.upper[2] + reach)
+    dive, rise = _cut(camera.eye[2], by[2], box.lower[2], 0.0)
     side_in, side_out = max(x_in, y_in), min(x_out, y_out)
     enter, leave = max(side_in, z_in), min(side_out, z_out)
     enter_axis = 2 if z_in > side_in else (0 if x_in > y_in else 1)
     leave_axis = 2 if z_out < side_out else (0 if x_out < y_out else 1)
     dive, rise = max(max(dive, side_in), 0.0), min(rise, side_out)
-    return Span(enter, leave, enter_axis, leave_axis, dive, rise, by_x, by_y, by_z)
-
-
-@inlined
-def sky(dz):
-    """Background in a direction of which the upward part is dz."""
-    if dz > 0.0:
-        return mix(_HORIZON, _ZENITH, min(1.7 * dz, 1.0))
-    return mix(_HORIZON, _BELOW, min(-1.4 * dz, 1.0))
+    return Span(enter, leave, enter_axis, leave_axis, dive, rise, by)
 
 
 @inlined
@@ -106,11 +88,9 @@ def _stroke(distance, half_width, blur, t, camera, slope, across, normal):
     """How much of a pixel a line on a plane covers.
 
     Args:
-        distance: from the line's middle, along one axis of the plane, m.
-        half_width: of the line, m.
+        distance, half_width: from its middle, along one axis of the plane, and its own, m.
         blur: no pixel is wider than this there, m.
-        t: length of the ray, m.
-        camera: the camera.
+        t, camera: length of the ray, m, and its camera.
         slope: the ray's part along that axis by its part along the plane's normal.
         across, normal: the parts of the camera's right and up along that axis, and along the normal.
     """
@@ -130,13 +110,15 @@ def _off_lines(value, low, high):
 
 
 @inlined
-def _level_lines(camera, box, span, dx, dy, t, half_width, blur):
+def _level_lines(camera, box, span, d, t, half_width, blur):
     """Coverage by the grid's lines on a level plane."""
-    right, up, normal = (camera.rx, camera.ux), (camera.ry, camera.uy), (camera.rz, camera.uz)
-    x, y = _off_lines(camera.ex + t * dx, box.x0, box.x1), _off_lines(camera.ey + t * dy, box.y0, box.y1)
+    right, up = camera.right, camera.up
+    normal = right[2], up[2]
+    x = _off_lines(camera.eye[0] + t * d[0], box.lower[0], box.upper[0])
+    y = _off_lines(camera.eye[1] + t * d[1], box.lower[1], box.upper[1])
     return max(
-        _stroke(x, half_width, blur, t, camera, dx * span.by_z, right, normal),
-        _stroke(y, half_width, blur, t, camera, dy * span.by_z, up, normal),
+        _stroke(x, half_width, blur, t, camera, d[0] * span.by[2], (right[0], up[0]), normal),
+        _stroke(y, half_width, blur, t, camera, d[1] * span.by[2], (right[1], up[1]), normal),
     )
 
 
@@ -148,56 +130,54 @@ def _haze(box, t):
 
 
 @inlined
-def _floor(camera, box, span, dx, dy, t):
-    """The sand, with a grid."""
-    line = _level_lines(camera, box, span, dx, dy, t, 0.045, t * camera.pixel * (1.0 - span.by_z))
-    return mix(mix(_SAND, _LINE, 0.55 * line), _HORIZON, _haze(box, t))
-
-
-@inlined
-def _wall(camera, box, span, axis, dx, dy, dz, t):
+def _wall(camera, box, span, axis, d, t):
     """How strongly a wall of the box is drawn at a point: (grid, edges with the waterline, transition zone)."""
-    z = camera.ez + t * dz
-    upright = camera.rz, camera.uz
+    x, y = (camera.right[0], camera.up[0]), (camera.right[1], camera.up[1])
+    by, part, along, low, top = span.by[1], d[0], camera.eye[0] + t * d[0], box.lower[0], box.upper[0]
     if axis == 0:
-        inverse, flat, normal, part = span.by_x, (camera.ry, camera.uy), (camera.rx, camera.ux), dy
-        along, low, top = camera.ey + t * dy, box.y0, box.y1
-    else:
-        inverse, flat, normal, part = span.by_y, (camera.rx, camera.ux), (camera.ry, camera.uy), dx
-        along, low, top = camera.ex + t * dx, box.x0, box.x1
-    blur = t * camera.pixel * (1.0 + abs(inverse))
-    side, rise = part * inverse, dz * inverse
+        x, y = y, x
+        by, part, along, low, top = span.by[0], d[1], camera.eye[1] + t * d[1], box.lower[1], box.upper[1]
+    z, upright = camera.eye[2] + t * d[2], (camera.right[2], camera.up[2])
+    blur = t * camera.pixel * (1.0 + abs(by))
+    side, rise = part * by, d[2] * by
     grid = max(
-        _stroke(_off_lines(along, low, top), 0.035, blur, t, camera, side, flat, normal),
-        _stroke(_off_lines(z, box.z0, box.z1), 0.035, blur, t, camera, rise, upright, normal),
+        _stroke(_off_lines(along, low, top), 0.035, blur, t, camera, side, x, y),
+        _stroke(_off_lines(z, box.lower[2], box.upper[2]), 0.035, blur, t, camera, rise, upright, y),
     )
     edge = max(
-        _stroke(min(abs(along - low), abs(along - top)), 0.05, blur, t, camera, side, flat, normal),
-        _stroke(abs(z), 0.05, blur, t, camera, rise, upright, normal),
+        _stroke(min(abs(along - low), abs(along - top)), 0.05, blur, t, camera, side, x, y),
+        _stroke(abs(z), 0.05, blur, t, camera, rise, upright, y),
     )
-    rim = _stroke(abs(abs(z) - box.zone), 0.03, blur, t, camera, rise, upright, normal)
+    rim = _stroke(abs(abs(z) - box.zone), 0.03, blur, t, camera, rise, upright, y)
     return grid, edge, max(0.35 if abs(z) < box.zone else 0.0, rim)
 
 
 @inlined
-def exit_colour(camera, box, span, dx, dy, dz):
-    """What a ray sees that meets no shape: floor, far wall or sky."""
-    background = sky(dz)
-    if span.leave <= max(span.enter, 0.0):
+def exit_colour(camera, box, span, d):
+    """What a ray sees that meets no shape: the sandy floor with its grid, far wall or sky."""
+    if d[2] > 0.0:
+        background = mix(_HORIZON, _ZENITH, min(1.7 * d[2], 1.0))
+    else:
+        background = mix(_HORIZON, _BELOW, min(-1.4 * d[2], 1.0))
+    t = span.leave
+    if t <= max(span.enter, 0.0):
         return background
     if span.leave_axis == 2:
-        return _floor(camera, box, span, dx, dy, span.leave) if dz < 0.0 else background
+        if d[2] >= 0.0:
+            return background
+        line = _level_lines(camera, box, span, d, t, 0.045, t * camera.pixel * (1.0 - span.by[2]))
+        return mix(mix(_SAND, _LINE, 0.55 * line), _HORIZON, _haze(box, t))
     if box.sea > 0.0:
         return background
-    grid, edge, band = _wall(camera, box, span, span.leave_axis, dx, dy, dz, span.leave)
+    grid, edge, band = _wall(camera, box, span, span.leave_axis, d, t)
     colour = mix(background, (0.34, 0.71, 0.91), 0.45 * band)
     return mix(colour, _LINE, max(0.30 * grid, 0.5 * edge))
 
 
 @inlined
-def near_wall(camera, box, span, dx, dy, dz):
+def near_wall(camera, box, span, d):
     """Colour and opacity of a wall that a ray passes on its way into the box: edges and zone only."""
-    _, edge, band = _wall(camera, box, span, span.enter_axis, dx, dy, dz, span.enter)
+    _, edge, band = _wall(camera, box, span, span.enter_axis, d, span.enter)
     return (0.10, 0.45, 0.70), max(0.35 * edge, 0.22 * band)
 
 
@@ -211,14 +191,14 @@ def _swell(turns):
 
 
 @inlined
-def surface(camera, box, span, dx, dy, dz, t):
+def surface(camera, box, span, d, t):
     """Colour and opacity of the water's surface, more of a mirror the flatter it is looked at."""
-    x, y = camera.ex + t * dx, camera.ey + t * dy
-    blur = t * camera.pixel * (1.0 + abs(span.by_z))
-    line = _level_lines(camera, box, span, dx, dy, t, 0.03, blur)
+    x, y = camera.eye[0] + t * d[0], camera.eye[1] + t * d[1]
+    blur = t * camera.pixel * (1.0 + abs(span.by[2]))
+    line = _level_lines(camera, box, span, d, t, 0.03, blur)
     wave = _swell(0.30 * x + 0.17 * y) + _swell(-0.21 * x + 0.36 * y + 0.2) + _swell(0.1 * x - 0.13 * y + 0.3)
     wave = wave * max(0.0, 1.0 - blur)  # waves that are narrower than a pixel would flicker
-    flat = 1.0 - abs(dz)
+    flat = 1.0 - abs(d[2])
     mirror = 0.04 + 0.96 * flat * flat * flat * flat * flat
     colour = mix(mix((0.42, 0.75, 0.92), (0.93, 0.97, 1.0), 0.35 + 0.10 * wave), (1.0, 1.0, 1.0), 0.7 * line)
     opacity = 0.16 + 0.55 * mirror + 0.03 * wave + 0.25 * line

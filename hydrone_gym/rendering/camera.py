@@ -1,15 +1,51 @@
-"""Where a picture is taken from, and which part of it a shape can reach."""
+"""Where a picture is taken from and how large it is, and which part of it a shape can reach."""
 
-from typing import NamedTuple
+import itertools
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from hydrone_gym.world.world import World
+
+CAMERAS = ("overview", "chase")
+LEAST, MOST = 64, 4096  # pixels
+ELEVATION = 20.0  # degrees, of cameras that see the whole box
 FIELD_OF_VIEW = 32.0  # degrees, over the height of the picture
 CHASE_FIELD = 50.0
 _BACK, _ABOVE, _AHEAD = 5.0, 2.3, 1.0  # m: where the chase camera is, and how far before the vehicle it looks
 _TICKS_REMEMBERED = 0.033  # share by which a move counts less with every tick since: half of it after 1 s
 _MARGIN = 0.97  # of the picture that the box may fill
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """What a picture is like; see the docstring of `HydroneEnv`.
+
+    Attributes:
+        size: width and height, pixels; even, as video codecs demand.
+        camera: "overview" or "chase".
+
+    Raises:
+        ValueError: a value out of range, naming the option, its rule and the value.
+    """
+
+    size: tuple[int, int] = (640, 480)
+    camera: str = "overview"
+
+    def __post_init__(self) -> None:
+        """Check every option."""
+        if self.camera not in CAMERAS:
+            raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
+        rule = f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels)"
+        if not isinstance(self.size, tuple | list) or len(self.size) != 2 or not all(map(_fits, self.size)):
+            raise ValueError(f"{rule}, got {self.size!r}")
+        object.__setattr__(self, "size", tuple(map(int, self.size)))
+
+
+def _fits(n: Any) -> bool:
+    return isinstance(n, int) and not isinstance(n, bool) and LEAST <= n <= MOST and n % 2 == 0
 
 
 class Pose(NamedTuple):
@@ -41,6 +77,13 @@ def looking(direction: NDArray[np.float64], eye: NDArray[np.float64], field: flo
     return Pose(eye, right, np.cross(right, forward), forward, field)
 
 
+def axes(azimuth: float, elevation: float) -> NDArray[np.float64]:
+    """Return right, up and towards the eye (3, 3), unit vectors, of a camera that stands at these angles, degrees."""
+    a, e = np.radians([azimuth, elevation])
+    right, up = (-np.sin(a), np.cos(a), 0.0), (-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e))
+    return np.array([right, up, (np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e))])
+
+
 def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, aspect: float) -> Pose:
     """Return the nearest camera that sees all of some points.
 
@@ -49,8 +92,7 @@ def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, asp
         azimuth, elevation: where it stands as seen from the points, degrees.
         aspect: width by height of the picture.
     """
-    a, e = np.radians([azimuth, elevation])
-    pose = looking(-np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]), np.zeros(3), FIELD_OF_VIEW)
+    pose = looking(-axes(azimuth, elevation)[2], np.zeros(3), FIELD_OF_VIEW)
     tangent = np.tan(np.radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
     depth = corners @ pose.forward
     # a corner is in view when its offset to each side is at most tangent times its depth: linear in the eye's place
@@ -59,6 +101,18 @@ def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, asp
     back = max((high - low) / (2.0 * k) for high, low, k in spans)
     across, upward = (0.5 * (high + low) for high, low, _ in spans)
     return pose._replace(eye=across * pose.right + upward * pose.up - back * pose.forward)
+
+
+def side_azimuth(start: ArrayLike, goal: ArrayLike) -> float:
+    """Return the azimuth (degrees) from which the way from start to goal (m) is seen from the side."""
+    x, y, _ = np.subtract(goal, start)
+    return float(np.degrees(np.arctan2(y, x))) - 75.0
+
+
+def beside(world: World, start: ArrayLike, goal: ArrayLike, aspect: float) -> Pose:
+    """Return the camera that sees the whole box from the side of the way from start to goal (m)."""
+    corners = np.array(list(itertools.product(*zip(world.lower, world.upper, strict=True))))
+    return overview(corners, side_azimuth(start, goal), ELEVATION, aspect)
 
 
 def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:

@@ -21,16 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Okabe and Ito's eight; yellow last, for it is faint on white
-COLOURS = (
-    style.BLUE,
-    style.ORANGE,
-    style.GREEN,
-    style.PURPLE,
-    style.WATER,
-    style.RED,
-    style.BLACK,
-    "#F0E442",
-)
+COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.WATER, style.RED, style.BLACK, "#F0E442")
 _MARKERS = "osD^vP*X"
 _WIDTH = 5.2  # inches of a panel
 _ROW = 0.37  # inches a policy takes
@@ -71,12 +62,7 @@ def plot_success(rates: Rates, *, title: str = "") -> Figure:
 
 
 def plot_distributions(
-    values: Mapping[str, ArrayLike],
-    label: str,
-    *,
-    title: str = "",
-    limit: float | None = None,
-    limit_label: str = "",
+    values: Mapping[str, ArrayLike], label: str, *, title: str = "", limit: float | None = None, limit_label: str = ""
 ) -> Figure:
     """Draw a box a policy: quartiles and median, whiskers from the 5th to the 95th percentile, single values beyond.
 
@@ -120,19 +106,10 @@ def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title
             if shares.shape != (len(counts), 3):
                 raise ValueError(f"rates of {policy} must have shape ({len(counts)}, 3), got {shares.shape}")
             places = np.asarray(counts) + step * (index - 0.5 * (len(rates) - 1))
-            axes.errorbar(
-                places,
-                shares[:, 0],
-                yerr=np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None),
-                color=colour(index),
-                marker=_MARKERS[index % len(_MARKERS)],
-                markersize=6.5,
-                linewidth=1.6,
-                linestyle="-" if index < len(COLOURS) else "--",
-                elinewidth=1.2,
-                label=shortened(policy, _LABEL),
-                **_RIM,
-            )
+            look: dict[str, Any] = {"color": colour(index), "marker": _MARKERS[index % len(_MARKERS)], **_RIM}
+            look |= {"linestyle": "-" if index < len(COLOURS) else "--", "linewidth": 1.6, "elinewidth": 1.2}
+            reach = np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None)
+            axes.errorbar(places, shares[:, 0], yerr=reach, markersize=6.5, label=shortened(policy, _LABEL), **look)
         axes.set_xticks(counts)
         axes.set_ylim(top=102.0)
         axes.set_xlabel("number of obstacles")
@@ -155,14 +132,9 @@ def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "")
         axes.set_xscale("log")
         for row, (p50, p99) in enumerate(times.values()):
             axes.plot([p50, p99], [row, row], color=colour(row), linewidth=3.0, solid_capstyle="round")
-            look: dict[str, Any] = {
-                "markeredgecolor": _EDGE,
-                "markeredgewidth": 0.7,
-                "markersize": 8,
-                "linestyle": "none",
-            }
-            for value, marker in ((p50, "o"), (p99, "D")):
-                axes.plot([value], [row], marker=marker, color=colour(row), **look)
+            look: dict[str, Any] = {"color": colour(row), "markersize": 8, **_RIM, "markeredgewidth": 0.7}
+            axes.plot(p50, row, "o", **look)
+            axes.plot(p99, row, "D", **look)
             _note(axes, row, f"{p50:.2g} / {p99:.2g}")
         axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
         axes.xaxis.set_minor_formatter(NullFormatter())
@@ -229,10 +201,9 @@ def _note(axes: Axes, row: int, text: str) -> None:
 
 def _interval(axes: Axes, row: int, low: float, high: float) -> None:
     """Draw the interval of a bar, white beneath dark so that it shows on dark bars too."""
-    for shade, width in (("white", 3.6), (_EDGE, 1.6)):
-        axes.plot([low, high], [row, row], color=shade, linewidth=width, solid_capstyle="butt", clip_on=False)
-    for end in (low, high):
-        axes.plot([end, end], [row - 0.16, row + 0.16], color=_EDGE, linewidth=1.6, clip_on=False)
+    look: dict[str, Any] = {"solid_capstyle": "butt", "clip_on": False}
+    axes.plot([low, high], [row, row], color="white", linewidth=3.6, **look)
+    axes.plot([low, high], [row, row], "|-", color=_EDGE, linewidth=1.6, markersize=10.5, markeredgewidth=1.6, **look)
 
 
 def _limit(axes: Axes, limit: float, label: str) -> None:

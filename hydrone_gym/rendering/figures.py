@@ -6,7 +6,6 @@ imported when the first figure is drawn, and no display is needed.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,30 +14,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.scene3d import Scene, split_at_surface
+from hydrone_gym.rendering.camera import side_azimuth
+from hydrone_gym.rendering.paths import crossing_points, dash, split_media
+from hydrone_gym.rendering.scene3d import Scene
+from hydrone_gym.rendering.track import Tree
+from hydrone_gym.world.scenario import Scenario
+from hydrone_gym.world.world import World
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOWER = (-10.0, -10.0, -5.0)  # m: the box of the paper's experiments
-UPPER = (10.0, 10.0, 10.0)
+_BOX = World()  # that of the paper's experiments
+Array = NDArray[np.float64]
 FORMATS = ("png", "pdf")
 _DASH, _GAP = 0.3, 0.21  # m: a path under water
 
 
-def camera_azimuth(start: Sequence[float], goal: Sequence[float]) -> float:
-    """Return the azimuth (degrees) from which the way from start to goal (m) is seen from the side."""
-    return float(np.degrees(np.arctan2(goal[1] - start[1], goal[0] - start[0]))) - 75.0
-
-
 def plot_path(
-    positions: NDArray[np.float64],
+    positions: Array,
     goal: Sequence[float],
-    detected: NDArray[np.float64],
-    undetected: NDArray[np.float64],
+    detected: Array,
+    undetected: Array,
     *,
-    lower: tuple[float, float, float] = LOWER,
-    upper: tuple[float, float, float] = UPPER,
+    lower: tuple[float, float, float] = _BOX.lower,
+    upper: tuple[float, float, float] = _BOX.upper,
     title: str = "",
 ) -> Figure:
     """Draw an executed path in its world (paper, Figs. 6 and 9).
@@ -46,69 +45,54 @@ def plot_path(
     Args:
         positions: (N, 3) m, in order of time; solid in air, dashed under water.
         goal: (3,) m.
-        detected, undetected: (k, 4) spheres x, y, z, r in m, black and faint.
+        detected, undetected: (k, BODY) obstacles, black and faint.
         lower, upper: corners of the world, m.
         title: shown above.
     """
-    scene = Scene(lower, upper, azimuth=camera_azimuth(positions[0], goal))
-    scene.spheres(undetected, style.FAINT, alpha=0.55)
-    scene.spheres(detected, style.DETECTED)
+    scene = Scene(lower, upper, azimuth=side_azimuth(positions[0], goal))
+    scene.obstacles(undetected, style.FAINT, alpha=0.55)
+    scene.obstacles(detected, style.DETECTED)
     air, water = split_media(positions)
     scene.lines(air, style.RED, 2.8, hidden=0.5)
     scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
-    crossings = crossing_points(positions)
-    for number, point in enumerate(crossings):
+    for number, point in enumerate(crossing_points(positions)):
         scene.ring(point, "" if number else "crossing of the surface")
     scene.mark(positions[0], "o", style.BLACK, 10, "start")
     scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    _legend(scene, title, _path_entries(len(undetected) > 0, bool(air), bool(water)))
+    entries = (
+        ("path in air", {"color": style.RED, "linewidth": 2.8}, air),
+        ("path under water", {"color": style.RED, "linewidth": 2.8, "linestyle": (0, (1.6, 1.1))}, water),
+        ("detected obstacle", _ball(style.DETECTED), True),
+        ("undetected obstacle", _ball(style.FAINT), len(undetected)),
+    )
+    _legend(scene, title, [(label, look) for label, look, there in entries if there])
     return scene.figure
 
 
-def plot_tree(
-    edges: NDArray[np.float64],
-    in_air: NDArray[np.bool_],
-    start: Sequence[float],
-    goal: Sequence[float],
-    obstacles: NDArray[np.float64],
-    *,
-    solution: NDArray[np.float64] | None = None,
-    lower: tuple[float, float, float] = LOWER,
-    upper: tuple[float, float, float] = UPPER,
-    title: str = "",
-) -> Figure:
+def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "") -> Figure:
     """Draw a planner's tree with every obstacle known (paper, Fig. 5).
 
     Args:
-        edges: (E, K, 3) the points of each edge, m, K at least 2.
-        in_air: (E,) True for edges in air (red), False for edges under water (purple).
-        start, goal: (3,) m, black dot and purple cross.
-        obstacles: (M, 4) spheres x, y, z, r in m.
-        solution: (N, 3) the chosen path, m, if any.
-        lower, upper: corners of the world, m.
+        tree: edges in air red, those under water purple, the path to the goal black.
+        scenario, world: where it was grown.
         title: shown above.
-
-    Raises:
-        ValueError: edges and media that do not match.
     """
-    edges, in_air = np.asarray(edges, dtype=np.float64), np.asarray(in_air, dtype=bool)
-    if edges.ndim != 3 or edges.shape[1] < 2 or edges.shape[2] != 3 or in_air.shape != edges.shape[:1]:
-        raise ValueError(f"edges must be (E, K, 3) with K >= 2 and in_air (E,), got {edges.shape} and {in_air.shape}")
-    scene = Scene(lower, upper, azimuth=camera_azimuth(start, goal))
-    scene.spheres(obstacles, style.DETECTED)
-    if solution is not None:  # beneath the branches, which keep their colour
-        scene.lines([np.asarray(solution)], style.BLACK, 4.5, lower=2)
-    scene.lines(list(edges[in_air]), style.RED, 1.3)
-    scene.lines(list(edges[~in_air]), style.PURPLE, 1.6)
-    scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
-    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    entries: list[tuple[str, dict[str, Any]]] = [
+    start, goal = scenario.start[:3], scenario.goal
+    scene = Scene(world.lower, world.upper, azimuth=side_azimuth(start, goal))
+    scene.obstacles(scenario.obstacles, style.DETECTED)
+    entries = [
         ("branch in air", {"color": style.RED, "linewidth": 2.0}),
         ("branch under water", {"color": style.PURPLE, "linewidth": 2.0}),
-        ("obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}),
+        ("obstacle", _ball(style.DETECTED)),
     ]
-    if solution is not None:
+    if len(tree.path):  # beneath the branches, which keep their colour
+        solution = tree.edges[tree.path]
+        scene.lines([np.concatenate((solution[:1, 0], solution[:, 1]))], style.BLACK, 4.5, lower=2)
         entries.insert(2, ("chosen path", {"color": style.BLACK, "linewidth": 4.5}))
+    scene.lines(list(tree.edges[tree.air]), style.RED, 1.3)
+    scene.lines(list(tree.edges[~tree.air]), style.PURPLE, 1.6)
+    scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
+    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
     _legend(scene, title, entries)
     return scene.figure
 
@@ -118,50 +102,9 @@ def save_figure(figure: Figure, path: str | Path) -> list[Path]:
     written = [Path(f"{path}.{suffix}") for suffix in FORMATS]
     for target in written:
         # no date inside, so equal flights give equal files
-        figure.savefig(
-            target,
-            dpi=style.DOTS_PER_INCH,
-            metadata={"CreationDate": None} if target.suffix == ".pdf" else None,
-        )
+        dateless = {"CreationDate": None} if target.suffix == ".pdf" else None
+        figure.savefig(target, dpi=style.DOTS_PER_INCH, metadata=dateless)
     return written
-
-
-def split_media(positions: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Cut a path (N, 3) at the surface into its parts in air and its parts under water."""
-    line = split_at_surface(np.asarray(positions, dtype=np.float64))
-    wet = line[:-1, 2] + line[1:, 2] < 0.0
-    cuts = [0, *(np.flatnonzero(wet[1:] != wet[:-1]) + 1).tolist(), len(line) - 1]
-    parts: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
-    for first, last in itertools.pairwise(cuts):
-        if last > first:
-            parts[int(wet[first])].append(line[first : last + 1])
-    return parts
-
-
-def crossing_points(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return where a path (N, 3) crosses z = 0, (c, 3), interpolated between samples."""
-    z = np.asarray(positions)[:, 2]
-    # the medium of a sample on the surface is water, as in the model
-    first = np.flatnonzero((z[:-1] > 0.0) != (z[1:] > 0.0))
-    share = (z[first] / (z[first] - z[first + 1]))[:, None]
-    points = positions[first] + share * (positions[first + 1] - positions[first])
-    points[:, 2] = 0.0
-    return points
-
-
-def dash(line: NDArray[np.float64], length: float, gap: float) -> list[NDArray[np.float64]]:
-    """Cut dashes of a length out of a polyline (n, 3), a gap apart, all in m along the line.
-
-    A dash pattern of Matplotlib would restart in every piece of the scene.
-    """
-    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
-    dashes = []
-    for begin in np.arange(0.0, along[-1], length + gap):
-        end = min(begin + length, along[-1])
-        inside = along[(along > begin) & (along < end)]
-        samples = np.concatenate(([begin], inside, [end]))
-        dashes.append(np.column_stack([np.interp(samples, along, line[:, axis]) for axis in range(3)]))
-    return dashes
 
 
 def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, Any]]]) -> None:
@@ -178,16 +121,6 @@ def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, Any]]])
         scene.figure.suptitle(title, y=0.975)
 
 
-_BALL = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
-
-
-def _path_entries(unknown: bool, air: bool, water: bool) -> list[tuple[str, dict[str, Any]]]:
-    entries: list[tuple[str, dict[str, Any]]] = []
-    if air:
-        entries.append(("path in air", {"color": style.RED, "linewidth": 2.8}))
-    if water:
-        entries.append(("path under water", {"color": style.RED, "linewidth": 2.8, "linestyle": (0, (1.6, 1.1))}))
-    entries.append(("detected obstacle", {**_BALL, "markerfacecolor": style.DETECTED[0]}))
-    if unknown:
-        entries.append(("undetected obstacle", {**_BALL, "markerfacecolor": style.FAINT[0]}))
-    return entries
+def _ball(shades: tuple[str, str]) -> dict[str, Any]:
+    look = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
+    return {**look, "markerfacecolor": shades[0]}

@@ -1,21 +1,26 @@
 """One picture of a mission: what is known of a moment becomes shapes, and a ray caster paints them."""
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
-from hydrone_gym.rendering import caption, shapes
+from hydrone_gym.rendering import shapes, style
 from hydrone_gym.rendering.backdrop import Box
-from hydrone_gym.rendering.camera import Pose, chase, overview
-from hydrone_gym.rendering.canvas import Canvas
-from hydrone_gym.rendering.figures import camera_azimuth
-from hydrone_gym.rendering.moment import Moment
-from hydrone_gym.rendering.view import View
+from hydrone_gym.rendering.camera import Pose, View, beside, chase
+from hydrone_gym.rendering.raycast import Canvas
+from hydrone_gym.rendering.track import Moment
+from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.vehicle import Vehicle
+from hydrone_gym.world.bodies import gaps_along
 from hydrone_gym.world.world import World
 
-_ELEVATION = 20.0  # degrees
 _VEHICLE_PIXELS = 34.0  # how wide the vehicle is at least, from the overview
 _OVERVIEW_SCALE = 2.5  # times its true size
+_GROUND, _GOOD, _BAD = "#1f2d3a", style.GREEN, "#b04a00"  # behind white letters
+_OPACITY = 0.85
+_LABELS = 16  # captions that are kept: pictures of about the same time share one
 
 
 class Painter:
@@ -30,9 +35,7 @@ class Painter:
     def __init__(self, view: View, world: World, vehicle: Vehicle) -> None:
         """Work out what stays the same."""
         self.view, self.world, self.vehicle = view, world, vehicle
-        bounds = np.array([world.lower, world.upper])
         self._canvas = Canvas(view.size)
-        self._corners = np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]])
 
     def paint(self, moment: Moment) -> NDArray[np.uint8]:
         """Return a new picture (height, width, 3); equal moments give equal bytes."""
@@ -42,18 +45,17 @@ class Painter:
         unit = self._unit(pose, position if following else np.zeros(3))
         widest = _VEHICLE_PIXELS * unit / (2.0 * self.vehicle.radius)
         scale = 1.0 if following else max(_OVERVIEW_SCALE, widest)
-        box = Box(*self.world.lower, *self.world.upper, self.world.zone, float(following))
+        box = Box(self.world.lower, self.world.upper, self.world.zone, float(following))
         image = self._canvas.picture(self._shapes(moment, pose, unit, scale), pose, box)
-        caption.write(image, *caption.describe(moment.time, position[2], self.world.zone, moment.outcome))
+        ground = {Outcome.RUNNING: _GROUND, Outcome.GOAL: _GOOD}.get(moment.outcome, _BAD)
+        _write(image, "   ".join(moment.words(self.world.zone)), ground)
         return image
 
     def pose(self, moment: Moment) -> Pose:
         """Return where a picture is taken from."""
-        width, height = self.view.size
         if self.view.camera == "chase":
             return chase(moment.ticks[:, :3], moment.goal)
-        azimuth = camera_azimuth(moment.ticks[0, :3].tolist(), moment.goal.tolist())
-        return overview(self._corners, azimuth, _ELEVATION, width / height)
+        return beside(self.world, moment.ticks[0, :3], moment.goal, self.view.size[0] / self.view.size[1])
 
     def _unit(self, pose: Pose, point: NDArray[np.float64]) -> float:
         """How much a pixel covers at a point (m): thin things are measured in it, to stay visible in any picture."""
@@ -65,7 +67,7 @@ class Painter:
         end, sent = (self._unit(pose, point) for point in (moment.goal, now[12:15]))
         return np.vstack(
             (
-                shapes.spheres(moment.obstacles, moment.detected, self._veiled(moment, pose)),
+                shapes.obstacles(moment.obstacles, moment.detected, self._veiled(moment, pose)),
                 shapes.vehicle(now[:12], self.vehicle.arm, scale),
                 shapes.shadow(now[:3], self.world.lower[2], 1.15 * scale * self.vehicle.radius),
                 shapes.path(moment.ticks[:, :3], max(0.02, 1.6 * unit)),
@@ -80,8 +82,28 @@ class Painter:
         """Which obstacles would hide the vehicle from a camera that follows it (M,); the overview hides nothing."""
         if self.view.camera == "overview":
             return np.zeros(len(moment.obstacles), bool)
-        way = moment.ticks[-1, :3] - pose.eye
-        offsets = moment.obstacles[:, :3] - pose.eye
-        share = np.clip(offsets @ way / (way @ way), 0.0, 1.0)
-        distance = np.linalg.norm(offsets - share[:, None] * way, axis=1)
-        return distance < moment.obstacles[:, 3] + self.vehicle.radius
+        return gaps_along(pose.eye, moment.ticks[-1, :3], moment.obstacles) < self.vehicle.radius
+
+
+@functools.lru_cache(_LABELS)
+def _label(text: str, colour: str, size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a label's colours (h, w, 3), 0 to 255, and its opacity (h, w, 1)."""
+    font = ImageFont.load_default(size)
+    left, _, right, _ = font.getbbox(text)
+    width, height = int(right - left) + size, int(1.6 * size)
+    label = Image.new("RGB", (width, height), colour)
+    ImageDraw.Draw(label).text((0.5 * width, 0.5 * height), text, fill="white", font=font, anchor="mm")
+    shape = Image.new("L", (4 * width, 4 * height))
+    ImageDraw.Draw(shape).rounded_rectangle((0, 0, 4 * width - 1, 4 * height - 1), 2 * size, fill=255)
+    cover = np.asarray(shape.resize((width, height), Image.Resampling.BOX), dtype=np.float64)[:, :, None]
+    return np.asarray(label, dtype=np.float64), _OPACITY * cover / 255.0
+
+
+def _write(image: NDArray[np.uint8], text: str, colour: str) -> None:
+    """Write a line in white on a colour into the lower left corner of a picture (h, w, 3)."""
+    size = max(12, image.shape[0] // 24)
+    margin = size // 2
+    paint, opacity = _label(text, colour, size)
+    paint, opacity = paint[:, : image.shape[1] - margin], opacity[:, : image.shape[1] - margin]
+    part = image[-margin - paint.shape[0] : -margin, margin : margin + paint.shape[1]]
+    part[:] = np.rint(part + opacity * (paint - part))

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.rendering import style
+from hydrone_gym.surface import in_air
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Array = NDArray[np.float64]
 _LEAST_ANGLE_RANGE = 4.0  # degrees: a straight flight must not look wild
 
 
-def plot_position(
-    times: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    references: NDArray[np.float64],
-    *,
-    zone: float = 0.8,
-    title: str = "",
-) -> Figure:
+def plot_position(times: Array, positions: Array, references: Array, *, zone: float = 0.8, title: str = "") -> Figure:
     """Draw x, y, z over time, executed and reference (paper, Figs. 7 and 10).
 
     Args:
@@ -33,9 +29,8 @@ def plot_position(
         zone: half-height of the transition zone, m: a band in z, and the time spent inside it in every panel.
         title: shown above.
     """
-    figure, panels = _three_panels(title)
-    for panel, name, column in zip(panels, "xyz", range(3), strict=True):
-        _panel(panel, f"{name} (m)", times, positions[:, column], references[:, column])
+    labels = ("x (m)", "y (m)", "z (m)")
+    figure, panels = _three_panels(title, times, labels, positions, references)
     panels[2].axhspan(-zone, zone, color=style.WATER, alpha=0.22, linewidth=0)
     panels[2].axhline(0.0, color=style.BLUE, linewidth=1.0)
     _finish(figure, panels, times, positions[:, 2], zone)
@@ -43,13 +38,7 @@ def plot_position(
 
 
 def plot_attitude(
-    times: NDArray[np.float64],
-    attitudes: NDArray[np.float64],
-    references: NDArray[np.float64],
-    heights: NDArray[np.float64],
-    *,
-    zone: float = 0.8,
-    title: str = "",
+    times: Array, attitudes: Array, references: Array, heights: Array, *, zone: float = 0.8, title: str = ""
 ) -> Figure:
     """Draw roll, pitch and yaw over time, executed and reference (paper, Figs. 8 and 11).
 
@@ -61,13 +50,13 @@ def plot_attitude(
         zone: half-height of the transition zone, m.
         title: shown above.
     """
-    figure, panels = _three_panels(title)
     yaw = np.unwrap(attitudes[:, 2])
     nearest = yaw + (references[:, 2] - yaw + np.pi) % (2.0 * np.pi) - np.pi
     executed = np.degrees(np.column_stack((attitudes[:, :2], yaw)))
     wanted = np.degrees(np.column_stack((references[:, :2], nearest)))
-    for panel, label, column in zip(panels, ("roll φ (°)", "pitch θ (°)", "yaw ψ (°)"), range(3), strict=True):
-        _panel(panel, label, times, executed[:, column], wanted[:, column])
+    labels = ("roll φ (°)", "pitch θ (°)", "yaw ψ (°)")
+    figure, panels = _three_panels(title, times, labels, executed, wanted)
+    for panel in panels:
         low, high = panel.get_ylim()
         if high - low < _LEAST_ANGLE_RANGE:
             middle = 0.5 * (low + high)
@@ -76,8 +65,10 @@ def plot_attitude(
     return figure
 
 
-def _three_panels(title: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure with three panels that share the time axis."""
+def _three_panels(
+    title: str, times: Array, labels: Sequence[str], executed: Array, references: Array
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with three panels that share the time axis: executed red, reference dotted black."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -85,37 +76,26 @@ def _three_panels(title: str) -> tuple[Figure, list[Axes]]:
         figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")
         panels = list(figure.subplots(3, 1, sharex=True))
         figure.suptitle(title)
+    for panel, label, flown, sent in zip(panels, labels, executed.T, references.T, strict=True):
+        panel.plot(times, flown, color=style.RED, linewidth=2.4)
+        panel.plot(times, sent, color=style.BLACK, linewidth=1.7, linestyle=":")
+        panel.set_ylabel(label)
+        panel.grid(color="#e6e6e6", linewidth=0.6)
+        panel.set_axisbelow(True)
     return figure, panels
 
 
-def _panel(
-    panel: Axes,
-    label: str,
-    times: NDArray[np.float64],
-    executed: NDArray[np.float64],
-    reference: NDArray[np.float64],
-) -> None:
-    """Draw one quantity: executed red, reference dotted black."""
-    panel.plot(times, executed, color=style.RED, linewidth=2.4)
-    panel.plot(times, reference, color=style.BLACK, linewidth=1.7, linestyle=":")
-    panel.set_ylabel(label)
-    panel.grid(color="#e6e6e6", linewidth=0.6)
-    panel.set_axisbelow(True)
-
-
-def _finish(
-    figure: Figure, panels: list[Axes], times: NDArray[np.float64], heights: NDArray[np.float64], zone: float
-) -> None:
+def _finish(figure: Figure, panels: list[Axes], times: Array, heights: Array, zone: float) -> None:
     """Shade the time inside the zone, mark the crossings, align the labels and add the legend."""
     from matplotlib import rc_context
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    air = heights > 0.0
+    shade: dict[str, Any] = {"color": style.WATER, "alpha": 0.22, "linewidth": 0}
+    air, inside = in_air(heights), np.abs(heights) <= zone
     crossings = times[1:][air[1:] != air[:-1]]
     for panel in panels:
-        for begin, end in _spans(times, np.abs(heights) <= zone):
-            panel.axvspan(begin, end, color=style.WATER, alpha=0.22, linewidth=0)
+        panel.fill_between(times, 0.0, 1.0, inside, transform=panel.get_xaxis_transform(), **shade)
         for time in crossings:
             panel.axvline(time, color=style.BLUE, linewidth=1.2, linestyle="--")
     panels[-1].set_xlabel("time (s)")
@@ -130,10 +110,3 @@ def _finish(
         handles.append(Line2D([], [], color=style.BLUE, linewidth=1.2, linestyle="--", label="crossing"))
     with rc_context(style.FONTS):
         figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
-
-
-def _spans(times: NDArray[np.float64], inside: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Return the (begin, end) of each run of True, s."""
-    edges = np.diff(np.concatenate(([0], inside.astype(int), [0])))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    return [(float(times[first]), float(times[last])) for first, last in zip(begins, ends, strict=True)]

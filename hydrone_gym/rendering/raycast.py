@@ -9,12 +9,15 @@ for only in the tiles of the picture that it can reach, and a picture without sh
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.rendering.backdrop import Box, Camera, exit_colour, mix, near_wall, span_of, surface
-from hydrone_gym.rendering.solids import glass, meet, solid
+from hydrone_gym.rendering.camera import Pose, outlines
+from hydrone_gym.rendering.solids import CAPSULE, OPACITY, glass, meet, prepare, solid
 
 TILE = 8  # pixels
+_LAYERS = 32  # translucent things kept along one ray, the nearest
 _SURFACE, _NEAR_WALL = -1, -2
 _EMPTY = -1  # mark of a ray that met no shape and was given up
 _ABSORPTION = 0.027  # 1/m, of blue under water; twice that of green, four times that of red
@@ -37,59 +40,67 @@ def _drown(colour, length):
 
 
 @inlined
-def _keep(depths, layers, count, t, layer):
+def _keep(found, count, t, layer):
     """Put a translucent thing among those found, nearest first; return how many there are, the farthest given up."""
-    k = min(count, depths.size - 1)
-    if count == depths.size and depths[k] < t:
+    k = min(count, len(found) - 1)
+    if count == len(found) and found[k, 0] < t:
         return count
-    while k > 0 and depths[k - 1] > t:
-        depths[k], layers[k] = depths[k - 1], layers[k - 1]
+    while k > 0 and found[k - 1, 0] > t:
+        found[k, 0], found[k, 1] = found[k - 1, 0], found[k - 1, 1]
         k -= 1
-    depths[k], layers[k] = t, layer
-    return min(count + 1, depths.size)
+    found[k, 0], found[k, 1] = t, layer
+    return min(count + 1, len(found))
 
 
 @inlined
-def _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, layers):
+def _meet_all(shapes, items, tile, found, d):
+    """Return the way to the nearest opaque shape of a tile, which one, and how many translucent ones are found."""
+    end, hit, count = math.inf, -1, 0
+    for k in range(tile[0], tile[1]):
+        item = items[k]
+        t = meet(shapes[item], d)
+        if t > 0.0 and t < end:
+            if shapes[item, OPACITY] < 1.0:
+                count = _keep(found, count, t, item)
+            else:
+                end, hit = t, item
+    return end, hit, count
+
+
+@inlined
+def _trace(place, shapes, items, tile, found, d, known):
     """Follow one ray, unless it meets no shape and what is there without shapes is known.
 
     Returns:
         Red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
     """
-    end, hit, count = math.inf, -1, 0
-    for k in range(first, last):
-        item = items[k]
-        t = meet(shapes[item, 0], shapes[item, 7], geometry[item], d)
-        if t > 0.0 and t < end:
-            if shapes[item, 14] < 1.0:
-                count = _keep(depths, layers, count, t, item)
-            else:
-                end, hit = t, item
+    camera, box = place
+    end, hit, count = _meet_all(shapes, items, tile, found, d)
     if known and hit < 0 and count == 0:
         return 0.0, 0.0, 0.0, _EMPTY
-    span = span_of(camera, box, d[0], d[1], d[2])
+    span = span_of(camera, box, d)
     inside = span.leave > max(span.enter, 0.0)
-    waterline = -camera.ez / d[2]
+    waterline = -camera.eye[2] / d[2]
     if inside and waterline > 0.0 and span.enter <= waterline and waterline <= span.leave and waterline < end:
-        count = _keep(depths, layers, count, waterline, _SURFACE)
+        count = _keep(found, count, waterline, _SURFACE)
     if inside and span.enter > 0.0 and span.enter_axis < 2 and span.enter < end:
-        count = _keep(depths, layers, count, span.enter, _NEAR_WALL)
+        count = _keep(found, count, span.enter, _NEAR_WALL)
     mark = hit * 64 + span.leave_axis + 8 * inside
     if hit >= 0:
-        colour, part = solid(shapes[hit], geometry[hit], d, end, camera)
+        colour, part = solid(shapes[hit], d, end, camera)
         mark += part
     else:
-        colour = exit_colour(camera, box, span, d[0], d[1], d[2])
+        colour = exit_colour(camera, box, span, d)
     for i in range(count - 1, -1, -1):
-        t, layer = depths[i], layers[i]
+        t, layer = found[i, 0], int(found[i, 1])
         if t < end:
             colour = _drown(colour, min(end, span.rise) - max(t, span.dive))
             if layer == _SURFACE:
-                paint, opacity = surface(camera, box, span, d[0], d[1], d[2], t)
+                paint, opacity = surface(camera, box, span, d, t)
             elif layer == _NEAR_WALL:
-                paint, opacity = near_wall(camera, box, span, d[0], d[1], d[2])
+                paint, opacity = near_wall(camera, box, span, d)
             else:
-                paint, opacity = glass(shapes[layer], geometry[layer], d, t, camera, box)
+                paint, opacity = glass(shapes[layer], d, t, camera, box)
             colour = mix(colour, paint, opacity)
             end = t
             mark = mark * 31 + layer
@@ -98,20 +109,15 @@ def _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, 
 
 
 @inlined
-def _ray(camera, column, row, width, height):
+def _ray(camera, column, row):
     """Unit direction through a point of the image, in pixels from its upper left corner."""
-    u = (column - 0.5 * width) * camera.pixel
-    v = (0.5 * height - row) * camera.pixel
-    x = camera.fx + u * camera.rx + v * camera.ux
-    y = camera.fy + u * camera.ry + v * camera.uy
-    z = camera.fz + u * camera.rz + v * camera.uz
+    u, v = (column - camera.middle[0]) * camera.pixel, (camera.middle[1] - row) * camera.pixel
+    right, up, forward = camera.right, camera.up, camera.forward
+    x = forward[0] + u * right[0] + v * up[0]
+    y = forward[1] + u * right[1] + v * up[1]
+    z = forward[2] + u * right[2] + v * up[2]
     scale = 1.0 / math.sqrt(1.0 + u * u + v * v)
     return x * scale, y * scale, z * scale
-
-
-@inlined
-def _byte(value):
-    return np.uint8(max(0.0, min(255.0, 255.0 * value + 0.5)))
 
 
 @inlined
@@ -128,52 +134,113 @@ def _smooth(marks, row, column):
 
 
 @inlined
-def _paint(image, row, column, fine, known, camera, box, shapes, geometry, items, first, last, depths, layers):
-    """Paint one pixel with one ray, or with four if fine; return the mark of its last ray."""
+def _look(place, shapes, items, tile, found, pixel, fine, known):
+    """Colour of a pixel from one ray, or from four if fine, 0 to 1, and the mark of its last ray."""
     red, green, blue, mark = 0.0, 0.0, 0.0, 0
     rays = 4 if fine else 1
     for k in range(rays):
-        x = column + 0.5 + (_CORNERS[k][0] if fine else 0.0)
-        y = row + 0.5 + (_CORNERS[k][1] if fine else 0.0)
-        d = _ray(camera, x, y, image.shape[1], image.shape[0])
-        r, g, b, mark = _trace(d, known, camera, box, shapes, geometry, items, first, last, depths, layers)
+        x = pixel[0] + 0.5 + (_CORNERS[k][0] if fine else 0.0)
+        y = pixel[1] + 0.5 + (_CORNERS[k][1] if fine else 0.0)
+        r, g, b, mark = _trace(place, shapes, items, tile, found, _ray(place[0], x, y), known)
         red, green, blue = red + r, green + g, blue + b
-    if mark != _EMPTY:
-        image[row, column, 0] = _byte(red / rays)
-        image[row, column, 1] = _byte(green / rays)
-        image[row, column, 2] = _byte(blue / rays)
-    return mark
+    return (red / rays, green / rays, blue / rays), mark
 
 
 @kernel
-def cast(image, marks, known, shapes, geometry, begins, items, depths, layers, camera_values, box_values):
+def cast(image, marks, known, place, shapes, begins, items, found):
     """Paint a picture.
 
     Args:
         image: (height, width, 3) uint8, written.
         marks: (height, width) int64, what each pixel sees, written.
         known: whether image and marks hold the picture without shapes; the result is the same.
-        shapes: (n, len(SHAPE_FIELDS)) float64: m, and colours from 0 to 1.
-        geometry: (n, 9), what is the same for every ray, see `hydrone_gym.rendering.canvas`.
+        place: a `Camera` and a `Box`.
+        shapes: float64, from `prepare`.
         begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
-        depths, layers: (k,) float64 and int64, working storage: the most translucent things kept along one ray.
-        camera_values, box_values: a `Camera` and a `Box` as arrays.
+        found: (k, 2) float64, working storage: the most translucent things kept along one ray.
     """
-    c, v = camera_values, box_values
-    camera = Camera(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11], c[12])
-    box = Box(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7])
     height, width = marks.shape
     columns = (width + TILE - 1) // TILE
-    for again in range(2):
+    for fine in (False, True):
         for row in range(height):
             for column in range(width):
-                tile = (row // TILE) * columns + column // TILE
-                first, last = begins[tile], begins[tile + 1]
-                if (known and first == last) or (again == 1 and _smooth(marks, row, column)):
+                number = (row // TILE) * columns + column // TILE
+                tile = begins[number], begins[number + 1]
+                if (known and tile[0] == tile[1]) or (fine and _smooth(marks, row, column)):
                     continue
-                fine, skip = again == 1, known and again == 0
-                mark = _paint(
-                    image, row, column, fine, skip, camera, box, shapes, geometry, items, first, last, depths, layers
-                )
-                if again == 0 and mark != _EMPTY:
+                colour, mark = _look(place, shapes, items, tile, found, (column, row), fine, known and not fine)
+                if mark == _EMPTY:
+                    continue
+                for k in range(3):
+                    image[row, column, k] = np.uint8(max(0.0, min(255.0, 255.0 * colour[k] + 0.5)))
+                if not fine:
                     marks[row, column] = mark
+
+
+class Canvas:
+    """Makes pictures of one size; from a camera that stands still it keeps the picture without shapes.
+
+    Args:
+        size: width and height, pixels.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """Know nothing yet."""
+        self.size = size
+        self._place: tuple[Camera, Box] | None = None
+        self._still: tuple[NDArray[np.uint8], NDArray[np.int64]] | None = None
+
+    def picture(self, shapes: NDArray[np.float64], pose: Pose, box: Box) -> NDArray[np.uint8]:
+        """Return a new picture (height, width, 3), the same whether or not one from there has been made before.
+
+        Args:
+            shapes: (n, len(SHAPE_FIELDS)), m, and colours from 0 to 1.
+            pose: the camera.
+            box: the world.
+        """
+        width, height = self.size
+        eye, right, up, forward = (tuple(axis.tolist()) for axis in pose[:4])
+        place = Camera(eye, right, up, forward, pose.pixel(height), (0.5 * width, 0.5 * height)), box
+        if place != self._place:
+            self._place, self._still = place, None
+        elif self._still is None:  # worth it from the second picture on
+            self._still = self._blank()
+            self._cast(*self._still, False, shapes[:0], pose)
+        still, seen = self._still or self._blank()
+        image, marks = still.copy(), seen.copy()
+        self._cast(image, marks, self._still is not None, shapes, pose)
+        return image
+
+    def _blank(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Return an empty picture and what its pixels see."""
+        width, height = self.size
+        return np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64)
+
+    def _cast(
+        self, image: NDArray[np.uint8], marks: NDArray[np.int64], known: bool, shapes: NDArray[np.float64], pose: Pose
+    ) -> None:
+        """Paint a picture, over the one without shapes if that is known."""
+        ends = np.stack((shapes[:, 1:4], np.where(shapes[:, :1] == CAPSULE, shapes[:, 4:7], shapes[:, 1:4])), axis=1)
+        tiles = _sort_into_tiles(outlines(pose, ends, shapes[:, 7], self.size, TILE), self.size)
+        cast(image, marks, known, self._place, prepare(shapes, pose.eye), *tiles, np.empty((_LAYERS, 2)))
+
+
+def _sort_into_tiles(outlines: NDArray[np.int64], size: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which shapes each tile of a picture has to look for.
+
+    Args:
+        outlines: (n, 4) first column and row, last column and row of the tiles each shape can reach, last excluded.
+        size: width and height of the picture, pixels.
+
+    Returns:
+        (tiles + 1,) where each tile's shapes begin in the second, and (m,) shapes, tile by tile.
+    """
+    columns, rows = (-(-pixels // TILE) for pixels in size)
+    wide, high = outlines[:, 2] - outlines[:, 0], outlines[:, 3] - outlines[:, 1]
+    counts = wide * high
+    items = np.repeat(np.arange(len(outlines)), counts)
+    place = np.arange(len(items)) - np.repeat(np.cumsum(counts) - counts, counts)
+    column = outlines[items, 0] + place % wide[items]
+    tile = (outlines[items, 1] + place // wide[items]) * columns + column
+    order = np.argsort(tile, kind="stable")
+    return np.searchsorted(tile[order], np.arange(columns * rows + 1)), items[order]

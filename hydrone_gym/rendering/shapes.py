@@ -6,10 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import Pose
-from hydrone_gym.rendering.solids import CAPSULE, DISC, SHADOW, SHAPE_FIELDS, SPHERE
+from hydrone_gym.rendering.paths import along
+from hydrone_gym.rendering.solids import CAPSULE, DISC, OPACITY, SHADOW, SHAPE_FIELDS, SPHERE
+from hydrone_gym.surface import in_air
+from hydrone_gym.world.bodies import placed
 
+Shades = tuple[str, str]  # away from and towards the sun
 Shapes = NDArray[np.float64]  # (n, len(SHAPE_FIELDS))
-_OPACITY = SHAPE_FIELDS.index("opacity")
 _BLACK = ("#101010", "#4a4a4a")
 _WHITE = ("#e8e8e8", "#ffffff")
 _PATH = ("#8f3d00", "#ff7a1a")
@@ -22,74 +25,59 @@ _HAIR = 0.005  # m: a shadow lies on its ground
 _PLUMB = ("#4f6475", "#6d8596")
 
 
-def rgb(colour: str) -> tuple[float, float, float]:
-    """Return the parts of a colour "#rrggbb", from 0 to 1."""
-    red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    return red, green, blue
-
-
 def _rows(
-    kind: int,
-    a: ArrayLike,
-    b: ArrayLike,
-    radius: ArrayLike,
-    colours: tuple[str, str],
-    opacity: float = 1.0,
-    foam: float = 0.0,
+    kind: int, a: ArrayLike, b: ArrayLike, radius: ArrayLike, shades: Shades, opacity: float = 1.0, foam: float = 0.0
 ) -> Shapes:
-    """Return shapes that share their colours; `a` is (n, 3), `b` (n, 3) or (3,), `radius` (n,) or a number, in m."""
+    """Return shapes of equal colours; `a` is (n, 3), `b` (n, 3) or (3,), `radius` (n,) or a number, in m."""
     first = np.atleast_2d(np.asarray(a, dtype=np.float64))
     rows = np.empty((len(first), len(SHAPE_FIELDS)))
     rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7] = kind, first, b, radius
-    rows[:, 8:11], rows[:, 11:14] = rgb(colours[0]), rgb(colours[1])
+    rows[:, 8:11], rows[:, 11:14] = style.rgb(shades[0]), style.rgb(shades[1])
     rows[:, 14], rows[:, 15] = opacity, foam
     return rows
 
 
-def spheres(obstacles: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
-    """Obstacles (M, 4) x, y, z, r in m: dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
-    rows = _rows(SPHERE, obstacles[:, :3], 0.0, obstacles[:, 3], style.DETECTED, foam=1.0)
-    rows[detected & veiled, _OPACITY] = 0.7
-    hidden = _rows(SPHERE, obstacles[~detected, :3], 0.0, obstacles[~detected, 3], style.GLASS, opacity=0.8, foam=1.0)
-    rows[~detected] = hidden
-    return rows
+def _model() -> dict[str, Shapes]:
+    """The vehicle by parts, level, the arms on its axes as in the model, the front one on +x; an arm is 1 m long."""
+    ends = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], dtype=np.float64)
+    up = np.array([0.0, 0.0, 1.0])
+    hubs, feet = ends + 0.12 * up, ends - 0.3 * up
+    frame = (
+        _rows(CAPSULE, -0.18 * up, 0.12 * up, 0.26, _ARM),
+        _rows(CAPSULE, np.zeros((3, 3)), ends[1:], 0.11, _ARM),
+        _rows(CAPSULE, feet, hubs, 0.066, _ARM),
+        _rows(DISC, feet, up, 0.3, _ARM),
+    )
+    front = _rows(CAPSULE, np.zeros(3), ends[0], 0.132, _FRONT), _rows(DISC, hubs[0], up, 0.62, _FRONT)
+    return {"frame": np.vstack(frame), "front": np.vstack(front), "rotors": _rows(DISC, hubs[1:], up, 0.62, _REAR)}
+
+
+MODEL = _model()
 
 
 def vehicle(state: NDArray[np.float64], arm: float, scale: float) -> Shapes:
-    """The vehicle at a state (12,): rotors on its axes as in the model, the front one in the colour of the path.
+    """The vehicle at a state (12,), so many times as large as it is; `arm` is from the middle to a rotor, m."""
+    turn, size = Rotation.from_euler("ZXY", state[[5, 3, 4]]).as_matrix(), arm * scale
+    rows = np.vstack(list(MODEL.values()))
+    ends = rows[:, 4:7] @ turn.T
+    rows[:, 1:4] = state[:3] + size * rows[:, 1:4] @ turn.T
+    rows[:, 4:7] = np.where(rows[:, :1] == CAPSULE, state[:3] + size * ends, ends)
+    rows[:, 7] *= size
+    return rows
 
-    Args:
-        state: as in the observation.
-        arm: from the middle to a rotor, m.
-        scale: how many times its true size it is drawn.
-    """
-    turn = Rotation.from_euler("ZXY", state[[5, 3, 4]]).as_matrix()
-    size = arm * scale
 
-    def place(*points: tuple[float, float, float]) -> NDArray[np.float64]:
-        return state[:3] + size * np.array(points) @ turn.T
-
-    hubs = place((1, 0, 0.12), (0, 1, 0.12), (-1, 0, 0.12), (0, -1, 0.12))
-    ends = place((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
-    feet = place((1, 0, -0.3), (0, 1, -0.3), (-1, 0, -0.3), (0, -1, -0.3))
-    low, high = place((0, 0, -0.18), (0, 0, 0.12))
-    front, up, thick = slice(0, 1), turn[:, 2], 0.11 * size
-    return np.vstack(
-        (
-            _rows(CAPSULE, low, high, 0.26 * size, _ARM),
-            _rows(CAPSULE, np.repeat(state[None, :3], 3, axis=0), ends[1:], thick, _ARM),
-            _rows(CAPSULE, state[:3], ends[front], 1.2 * thick, _FRONT),
-            _rows(CAPSULE, feet, hubs, 0.6 * thick, _ARM),
-            _rows(DISC, hubs[1:], up, 0.62 * size, _REAR),
-            _rows(DISC, hubs[front], up, 0.62 * size, _FRONT),
-            _rows(DISC, feet, up, 0.3 * size, _ARM),
-        )
-    )
+def obstacles(bodies: NDArray[np.float64], detected: NDArray[np.bool_], veiled: NDArray[np.bool_]) -> Shapes:
+    """Obstacles (M, BODY): dark where detected (M,), dark glass if also veiled (M,), else clear glass."""
+    middles, radii = placed(bodies)
+    rows = _rows(SPHERE, middles, 0.0, radii, style.DETECTED, foam=1.0)
+    glass = _rows(SPHERE, middles, 0.0, radii, style.GLASS, opacity=0.8, foam=1.0)
+    rows[detected & veiled, OPACITY] = 0.7
+    return np.where(detected[:, None], rows, glass)
 
 
 def shadow(position: NDArray[np.float64], floor: float, radius: float) -> Shapes:
     """The vehicle's shadow on what is below it, water or floor (at z = `floor`), wider and fainter from high above."""
-    ground = 0.0 if position[2] > 0.0 else floor
+    ground = 0.0 if in_air(position[2]) else floor
     height = max(position[2] - ground, 0.0)
     below = np.array([position[0], position[1], ground + _HAIR])
     return _rows(SHADOW, below, (0.0, 0.0, 1.0), radius * (1.0 + 0.06 * height), _SHADE, 0.5 / (1.0 + 0.08 * height))
@@ -97,9 +85,8 @@ def shadow(position: NDArray[np.float64], floor: float, radius: float) -> Shapes
 
 def path(points: NDArray[np.float64], radius: float) -> Shapes:
     """The flown path (N, 3) as a tube, with a ball at its start."""
-    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
     # one point a stretch, counted from the start, so that the tube does not shimmer as the path grows
-    steps = np.floor(along / (2.0 * radius)).astype(np.int64)
+    steps = np.floor(along(points) / (2.0 * radius)).astype(np.int64)
     new = np.diff(steps, prepend=-1) > 0
     new[-1] = True
     chosen = points[new]

@@ -5,44 +5,45 @@ before it is not drawn at all. So every translucent node has its origin in its m
 of its own, and unknown obstacles are two: those under water, in its middle, and those in the air.
 """
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from hydrone_gym.rendering import style
-from hydrone_gym.rendering.caption import describe
-from hydrone_gym.rendering.meshes import Mesh, ball, slab, vehicle, walls
-from hydrone_gym.rendering.moment import Moment
-from hydrone_gym.rendering.shapes import rgb
+from hydrone_gym.rendering import shapes, style
+from hydrone_gym.rendering.solids import CAPSULE
+from hydrone_gym.rendering.track import Moment, Tree
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.surface import in_air
+from hydrone_gym.world.bodies import UNIT, belt, mesh, placed
 from hydrone_gym.world.world import World
 
 VEHICLE_SCALE = 3.0  # times its true size
 GRID = 5.0  # m between the lines on the floor
 UNKNOWN, DETECTED = style.GLASS[0], "#2b2b2b"
 _SAND, _LINES, _ARM, _ROTOR = "#ded0ad", "#8b98a5", "#10283a", "#9fb2c2"
-_GONE = 1e-6  # scale of a sphere that is not there; 0 would leave it without normals
+_GONE = 1e-6  # scale of an obstacle that is not there; 0 would leave it without normals
 _CHUNK = 20  # ticks of the path in one node: only the last one is sent anew at every tick
 _FINE = 128.0  # steps a metre in the vertices of trees: round numbers make small pages
 _GLASS = 0.5  # opacity
+_SHADELESS = {"cast_shadow": False, "receive_shadow": False}
+_THICK = 0.02  # half of a disc
+_RECTANGLE = np.array([(0, 1, 2), (0, 2, 3)])
 
 
-class Tree(Protocol):
-    """A planner's tree in one period, such as `planners.TreeView`."""
+class Mesh(NamedTuple):
+    """A surface of triangles, seen from outside."""
 
-    @property
-    def edges(self) -> NDArray[np.float64]:
-        """References at both ends of each edge, (E, 2, 3) in m."""
+    vertices: NDArray[np.float64]  # (n, 3) m
+    faces: NDArray[np.int64]  # (m, 3) vertices, counter-clockwise
 
-    @property
-    def air(self) -> NDArray[np.bool_]:
-        """Whether an edge ends in air, (E,)."""
-
-    @property
-    def path(self) -> NDArray[np.intp]:
-        """Edges of the path that is followed, in order."""
+    @classmethod
+    def joined(cls, *meshes: "Mesh") -> Self:
+        """Return several meshes as one."""
+        counts = np.cumsum([0, *(len(part.vertices) for part in meshes)])
+        faces = [part.faces + first for part, first in zip(meshes, counts)]
+        return cls(np.concatenate([part.vertices for part in meshes]), np.concatenate(faces))
 
 
 class Stage:
@@ -57,8 +58,10 @@ class Stage:
     def __init__(self, scene: Any, moment: Moment, simulation: Simulation) -> None:
         """Add everything that stands still, and what moves where it begins."""
         self._scene, self._world = scene, simulation.world
-        self._obstacles = moment.obstacles
-        self._vehicle = self._add_vehicle(simulation.vehicle.arm * VEHICLE_SCALE)
+        self._middles, self._sizes = placed(moment.obstacles)
+        self._vehicle = scene.add_frame("/vehicle", show_axes=False)
+        for name, colour in (("frame", _ARM), ("front", style.RED), ("rotors", _ROTOR)):
+            self._mesh(f"/vehicle/{name}", model(shapes.MODEL[name], simulation.vehicle.arm * VEHICLE_SCALE), colour)
         self._reference = self._mesh("/reference", ball(0.14, rings=8), style.BLACK)
         (x0, y0, bottom), (x1, y1, top) = simulation.world.lower, simulation.world.upper
         x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
@@ -70,12 +73,10 @@ class Stage:
         self._add_marks(moment, simulation.world)
         self._add_box(simulation.world)
         self._add_water(simulation.world)
-        wet = moment.obstacles[:, 2] < 0.0
-        self._known = [self._spheres("/obstacles/detected", np.ones(len(wet), bool), DETECTED)]
-        self._unknown = [
-            self._spheres("/obstacles/unknown, under water", wet, UNKNOWN, (x, y, 0.5 * bottom)),
-            self._spheres("/obstacles/unknown, in the air", ~wet, UNKNOWN, (x, y, 0.5 * top)),
-        ]
+        dry = in_air(self._middles[:, 2])
+        self._known = self._bodies("/obstacles/detected", dry | True, DETECTED)
+        self._unknown = self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom))
+        self._unknown += self._bodies("/obstacles/unknown, in the air", dry, UNKNOWN, (x, y, 0.5 * top))
 
     def show(self, moment: Moment) -> None:
         """Move to a moment; to be called for every tick in order."""
@@ -84,13 +85,12 @@ class Stage:
         self._vehicle.position, self._vehicle.wxyz = state[:3], turn.as_quat(scalar_first=True)
         self._reference.position = reference
         self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
-        self._label.text = ", ".join(describe(moment.time, state[2], self._world.zone, moment.outcome)[0].split("   "))
+        self._label.text = ", ".join(moment.words(self._world.zone))
         self._grow(moment.ticks[:, :3])
         for group, there in ((self._known, moment.detected), (self._unknown, ~moment.detected)):
-            scales = np.where(there, self._obstacles[:, 3], _GONE).astype(np.float32)
-            for spheres, chosen in group:
-                if spheres is not None:
-                    spheres.batched_scales = scales[chosen]
+            scales = np.where(there, self._sizes, _GONE).astype(np.float32)
+            for bodies, chosen in group:
+                bodies.batched_scales = scales[chosen]
 
     def plan(self, tree: Tree) -> None:
         """Show the tree of a period, and the path in it."""
@@ -122,18 +122,6 @@ class Stage:
         else:
             self._path.points = edges.astype(np.float32)
 
-    def _add_vehicle(self, arm: float) -> Any:
-        """Add the vehicle; return the frame it moves with."""
-        frame = self._scene.add_frame("/vehicle", show_axes=False)
-        parts = vehicle(arm)
-        for name, mesh, colour in (
-            ("frame", parts.frame, _ARM),
-            ("front", parts.front, style.RED),
-            ("rotors", parts.rotors, _ROTOR),
-        ):
-            self._mesh(f"/vehicle/{name}", mesh, colour)
-        return frame
-
     def _add_marks(self, moment: Moment, world: World) -> None:
         """Add start and goal, each with a line to the surface."""
         start, goal = moment.ticks[0, :3], moment.goal
@@ -148,7 +136,9 @@ class Stage:
         """Add the box and its floor."""
         (x0, y0, z0), (x1, y1, _) = world.lower, world.upper
         self._mesh("/box/floor", slab(z0 - 0.02, world.lower, world.upper), _SAND, side="double")
-        self._lines("/box/edges", _edges(world), _LINES, 1.5)
+        sides = [side.vertices for side in walls(world.lower, world.upper, z0, world.upper[2])]
+        edges = np.concatenate([np.stack((side, np.roll(side, -1, axis=0)), axis=1) for side in sides])
+        self._lines("/box/edges", edges, _LINES, 1.5)  # those that stand are there twice
         across = [[(x, y0, z0), (x, y1, z0)] for x in np.arange(x0, x1 + 0.5 * GRID, GRID)]
         along = [[(x0, y, z0), (x1, y, z0)] for y in np.arange(y0, y1 + 0.5 * GRID, GRID)]
         self._lines("/box/grid", np.array(across + along), _LINES, 1.0)
@@ -165,57 +155,64 @@ class Stage:
             for k, wall in enumerate(walls(lower, upper, low, high)):
                 self._mesh(f"/{name} {k}", wall, colour, opacity=opacity, side="double")
 
-    def _spheres(
-        self,
-        name: str,
-        chosen: NDArray[np.bool_],
-        colour: str,
-        origin: tuple[float, float, float] | None = None,
-    ) -> tuple[Any, NDArray[np.bool_]]:
-        """Add some of the obstacles in one look, none of them there yet; return them, None for none, and which.
-
-        With an origin (m) they are glass.
-        """
+    def _bodies(
+        self, name: str, chosen: NDArray[np.bool_], colour: str, origin: tuple[float, float, float] | None = None
+    ) -> list[tuple[Any, NDArray[np.bool_]]]:
+        """Add some of the obstacles in one look, if any, none of them there yet; with an origin (m) they are glass."""
         if not chosen.any():
-            return None, chosen
-        mesh, count, middle = ball(1.0), int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
-        spheres = self._scene.add_batched_meshes_simple(
-            name,
-            mesh.vertices,
-            mesh.faces,
-            np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            self._obstacles[chosen, :3] - middle,
-            batched_scales=np.full(count, _GONE),
-            batched_colors=rgb(colour),
-            opacity=None if origin is None else _GLASS,
-            position=middle,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        return spheres, chosen
+            return []
+        count, middle = int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
+        place = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), self._middles[chosen] - middle
+        look: dict[str, Any] = {"batched_colors": style.rgb(colour), "opacity": origin and _GLASS, "lod": "off"}
+        look |= {"batched_scales": np.full(count, _GONE), "position": middle, **_SHADELESS}
+        bodies = self._scene.add_batched_meshes_simple(name, *mesh(UNIT), *place, **look)
+        return [(bodies, chosen)]
 
-    def _mesh(self, name: str, mesh: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
+    def _mesh(self, name: str, part: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
         """Add a mesh; one that is translucent has its origin in its middle."""
-        middle = np.zeros(3) if opacity is None else mesh.vertices.mean(axis=0)
-        return self._scene.add_mesh_simple(
-            name,
-            mesh.vertices - middle,
-            mesh.faces,
-            position=middle,
-            color=rgb(colour),
-            opacity=opacity,
-            side=side,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        middle = np.zeros(3) if opacity is None else part.vertices.mean(axis=0)
+        look = {"color": style.rgb(colour), "opacity": opacity, "side": side, **_SHADELESS}
+        return self._scene.add_mesh_simple(name, part.vertices - middle, part.faces, position=middle, **look)
 
     def _lines(self, name: str, points: NDArray[np.float64], colour: str, width: float) -> Any:
         """Add edges (n, 2, 3), so many pixels wide."""
-        return self._scene.add_line_segments(name, points, rgb(colour), thickness=width, thickness_units="screen")
+        return self._scene.add_line_segments(name, points, style.rgb(colour), thickness=width, thickness_units="screen")
 
 
-def _edges(world: World) -> NDArray[np.float64]:
-    """Return the edges of the box, those that stand twice, (16, 2, 3)."""
-    sides = walls(world.lower, world.upper, world.lower[2], world.upper[2])
-    return np.concatenate([np.stack((side.vertices, np.roll(side.vertices, -1, axis=0)), axis=1) for side in sides])
+def ball(radius: float, centre: ArrayLike = (0.0, 0.0, 0.0), rings: int = 16) -> Mesh:
+    """Return a sphere (m)."""
+    vertices, faces = mesh(UNIT, rings)
+    return Mesh(np.array(centre) + radius * vertices, faces)
+
+
+def rod(start: ArrayLike, end: ArrayLike, radius: float, sections: int = 12) -> Mesh:
+    """Return a cylinder from one point to another (m), closed at both ends."""
+    a, b = np.array(start, dtype=np.float64), np.array(end, dtype=np.float64)
+    forward = (b - a) / np.linalg.norm(b - a)
+    right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
+    right /= np.linalg.norm(right)
+    turns = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)[:, None]
+    circle = radius * (np.cos(turns) * right + np.sin(turns) * np.cross(forward, right))
+    return Mesh(np.concatenate((a + 0.0 * circle, a + circle, b + circle, b + 0.0 * circle)), belt(3, sections))
+
+
+def slab(z: float, lower: ArrayLike, upper: ArrayLike) -> Mesh:
+    """Return a level rectangle at height z between two corners of a box (m)."""
+    (x0, y0, _), (x1, y1, _) = np.array(lower), np.array(upper)
+    return Mesh(np.array([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]), _RECTANGLE)
+
+
+def walls(lower: ArrayLike, upper: ArrayLike, low: float, high: float) -> list[Mesh]:
+    """Return the four upright sides of a box between two heights (m), seen from outside."""
+    floor, top = slab(low, lower, upper).vertices, slab(high, lower, upper).vertices
+    return [Mesh(np.array([floor[k - 1], floor[k], top[k], top[k - 1]]), _RECTANGLE) for k in (1, 2, 3, 0)]
+
+
+def model(rows: NDArray[np.float64], size: float) -> Mesh:
+    """Return capsules and discs of the ray caster as rods, so many times as large."""
+    rods = []
+    for row in rows:
+        a, b = row[1:4], row[4:7]
+        ends = (a, b) if row[0] == CAPSULE else (a - _THICK * b, a + _THICK * b)
+        rods.append(rod(size * ends[0], size * ends[1], size * row[7], 20))
+    return Mesh.joined(*rods)

@@ -24,3 +24,9 @@ FONTS: dict[str, object] = {
     "pdf.fonttype": 42,  # text stays text
     "path.simplify": True,
 }
+
+
+def rgb(colour: str) -> tuple[float, float, float]:
+    """Return the parts of a colour "#rrggbb", from 0 to 1."""
+    red, green, blue = (part / 255.0 for part in bytes.fromhex(colour[1:]))
+    return red, green, blue

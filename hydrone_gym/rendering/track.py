@@ -1,11 +1,31 @@
-"""What has been flown, at every tick, for pictures: kept as what was sent and played again only when it is drawn."""
+"""What there is to draw: what has been flown at every tick, and a mission at a moment of it.
+
+A track keeps what was sent, and is flown again only when it is drawn.
+"""
+
+import copy
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation, trajectory
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.simulation import TICK, Simulation, trajectory
+from hydrone_gym.surface import in_air
+from hydrone_gym.world.bodies import distances
+from hydrone_gym.world.scenario import Scenario
 
 Ticks = NDArray[np.float64]  # (N, 16) a row a tick: state (12), and reference x, y, z in m and yaw in rad (4)
+_ENDS = {
+    Outcome.GOAL: "goal reached",
+    Outcome.COLLISION: "collision",
+    Outcome.OUT_OF_BOUNDS: "out of bounds",
+    Outcome.ROUGH_TRANSITION: "rough crossing",
+    Outcome.TIMEOUT: "time is up",
+    Outcome.DIVERGED: "out of control",
+}
+_SLACK = 1e-3  # m: ticks are samples, sensing is continuous
 
 
 class Track:
@@ -13,7 +33,7 @@ class Track:
 
     Args:
         row: (1,) dtype `ROW`: where it begins; copied.
-        obstacles: (M, 4) spheres x, y, z, r in m.
+        obstacles: (M, BODY) see `hydrone_gym.world.bodies`.
     """
 
     def __init__(self, row: np.ndarray, obstacles: NDArray[np.float64]) -> None:
@@ -42,7 +62,101 @@ class Track:
 
     def copy(self) -> "Track":
         """Return a track that goes on by itself; arrays are shared, as none is ever changed."""
-        twin = Track.__new__(Track)
-        twin.goal, twin.obstacles = self.goal, self.obstacles
+        twin = copy.copy(self)
         twin._parts, twin._waiting = self._parts.copy(), self._waiting.copy()
         return twin
+
+
+class Moment(NamedTuple):
+    """A mission at a moment."""
+
+    ticks: Ticks  # (N, 16) flown so far, the last one now
+    goal: NDArray[np.float64]  # (3,) m
+    obstacles: NDArray[np.float64]  # (M, BODY)
+    detected: NDArray[np.bool_]  # (M,)
+    time: float  # s
+    outcome: Outcome
+
+    def words(self, zone: float) -> tuple[str, str]:
+        """Return the time, and how the mission ended or else where it is; `zone` (m) is half of the transition zone."""
+        z = float(self.ticks[-1, 2])
+        medium = "crossing" if abs(z) <= zone else "in the air" if in_air(z) else "under water"
+        return f"{self.time:.1f} s", _ENDS.get(self.outcome, medium)
+
+
+def moments(last: Moment, counts: Iterable[int], sensor_range: float) -> Iterator[Moment]:
+    """Yield a mission at earlier moments, those at which so many of its ticks had been flown.
+
+    Args:
+        last: the mission now.
+        counts: numbers of ticks, the start included, from 1 to all.
+        sensor_range: distance (m) at which a surface is detected. What has been detected without having come so near
+            was known from the start.
+    """
+    near = distances(last.ticks[:, :3], last.obstacles) <= sensor_range + _SLACK
+    since = np.argmax(near, axis=0)
+    total = len(last.ticks)
+    for count in counts:
+        if count == total:
+            yield last
+            continue
+        yield last._replace(
+            ticks=last.ticks[:count],
+            detected=last.detected & (since < count),
+            time=last.time - (total - count) * TICK,
+            outcome=Outcome.RUNNING,
+        )
+
+
+class Flown(Protocol):
+    """What pictures need of a flight, such as `hydrone_gym.evaluation.fly` returns."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was flown."""
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+
+    @property
+    def time(self) -> float:
+        """When it ended, s."""
+
+    @property
+    def detected(self) -> NDArray[np.float64]:
+        """Obstacles detected by then, (k, BODY)."""
+
+    @property
+    def trace(self) -> Any:
+        """Every tick: `states` (N, 12) and `references` (N, 4)."""
+
+
+def moment_of(flight: Flown) -> Moment:
+    """Return the end of a flight as a moment to be drawn."""
+    known = {tuple(body) for body in flight.detected.tolist()}
+    obstacles = flight.scenario.obstacles
+    return Moment(
+        ticks=np.hstack((flight.trace.states, flight.trace.references)),
+        goal=np.array(flight.scenario.goal),
+        obstacles=obstacles,
+        detected=np.array([tuple(body) in known for body in obstacles.tolist()], dtype=bool),
+        time=flight.time,
+        outcome=flight.outcome,
+    )
+
+
+class Tree(Protocol):
+    """A planner's tree in one period, such as `planners.TreeView`."""
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """References at both ends of each edge, (E, 2, 3) in m."""
+
+    @property
+    def air(self) -> NDArray[np.bool_]:
+        """Whether an edge ends in air, (E,)."""
+
+    @property
+    def path(self) -> NDArray[np.intp]:
+        """Edges of the path that is followed, in order."""

@@ -3,58 +3,17 @@
 import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
+from hydrone_gym.rendering.camera import View
 from hydrone_gym.rendering.frame import Painter
-from hydrone_gym.rendering.moment import Moment, replay
-from hydrone_gym.rendering.view import View
-from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.rendering.track import Flown, moment_of, moments
 from hydrone_gym.simulation.simulation import TICK
 from hydrone_gym.vehicle import HYDRONE, Vehicle
-from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
-
-
-class Flown(Protocol):
-    """What a film needs of a flight, such as `hydrone_gym.evaluation.fly` returns."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """What was flown."""
-
-    @property
-    def outcome(self) -> Outcome:
-        """How it ended."""
-
-    @property
-    def time(self) -> float:
-        """When it ended, s."""
-
-    @property
-    def detected(self) -> NDArray[np.float64]:
-        """Spheres detected by then, (k, 4) x, y, z, r in m."""
-
-    @property
-    def trace(self) -> Any:
-        """Every tick: `states` (N, 12) and `references` (N, 4)."""
-
-
-def moment_of(flight: Flown) -> Moment:
-    """Return the end of a flight as a moment to be drawn."""
-    known = {tuple(sphere) for sphere in flight.detected.tolist()}
-    obstacles = flight.scenario.obstacles
-    return Moment(
-        ticks=np.hstack((flight.trace.states, flight.trace.references)),
-        goal=np.array(flight.scenario.goal),
-        obstacles=obstacles,
-        detected=np.array([tuple(sphere) in known for sphere in obstacles.tolist()], dtype=bool),
-        time=flight.time,
-        outcome=flight.outcome,
-    )
 
 
 def frames(
@@ -72,7 +31,7 @@ def frames(
         flight: from `hydrone_gym.evaluation.fly`.
         size, camera: as `render_size` and `camera` of the environments.
         every: ticks of 0.05 s from picture to picture.
-        world: the world it was flown in, the default one if None; its sensor range tells when spheres were detected.
+        world: the world it was flown in, the default one if None; its sensor range tells when obstacles were detected.
         vehicle: the vehicle.
 
     Raises:
@@ -84,7 +43,7 @@ def frames(
     painter = Painter(View(size=size, camera=camera), world, vehicle)
     last = moment_of(flight)
     counts = range(len(last.ticks), 0, -every)[::-1]
-    return map(painter.paint, replay(last, counts, world.sensor_range))
+    return map(painter.paint, moments(last, counts, world.sensor_range))
 
 
 def save_film(pictures: Iterable[NDArray[np.uint8]], path: str | Path, *, fps: float = 1.0 / TICK) -> None:

@@ -1,57 +1,56 @@
-"""The options of pictures, checked in one place, and the screen of an environment; nothing heavy is imported here."""
+"""What an environment holds to be drawn: the tracks of its rows, and pictures or a window made of them."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import time
 
 import numpy as np
 from gymnasium import logger
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from hydrone_gym.simulation.simulation import Simulation
-
-if TYPE_CHECKING:
-    from hydrone_gym.rendering.track import Track
+from hydrone_gym.rendering.camera import View
+from hydrone_gym.rendering.track import Moment, Track, moments
+from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.simulation.simulation import TICK, Simulation
 
 MODES = ("rgb_array", "human")
-CAMERAS = ("overview", "chase")
-LEAST, MOST = 64, 4096  # pixels
 
 
-@dataclass(frozen=True, kw_only=True)
-class View:
-    """What a picture is like; see the docstring of `HydroneEnv`.
+class Screen:
+    """Draws the rows of one environment and never changes them; without a mode it keeps nothing and shows nothing.
 
-    Attributes:
-        size: width and height, pixels; even, as video codecs demand.
-        camera: "overview" or "chase".
+    Args:
+        mode: of `modes`; "human" shows row 0 in a window, tick by tick and in real time, instead of returning pictures.
+        size, camera: see `View`.
+        simulation: the environment's; a twin is made, as its working storage is in use.
+        modes: those that the environment knows.
 
     Raises:
-        ValueError: a value out of range, naming the option, its rule and the value.
+        ValueError: an option out of range.
+        DependencyNotInstalled: mode "human" without pygame.
     """
 
-    size: tuple[int, int] = (640, 480)
-    camera: str = "overview"
+    def __init__(
+        self,
+        mode: str | None,
+        size: tuple[int, int],
+        camera: str,
+        simulation: Simulation,
+        modes: tuple[str, ...] = MODES,
+    ) -> None:
+        """Check the options and make all but the tracks."""
+        view = View(size=size, camera=camera)
+        if mode is not None and mode not in modes:
+            raise ValueError(f"render_mode must be one of None, {', '.join(map(repr, modes))}, got {mode!r}")
+        self._tracks: dict[int, Track] = {}
+        self._shown = 0  # ticks of row 0 that the window has shown
+        self._painter, self._window = None, None
+        if mode is not None:  # what is heavy is imported by environments that are drawn
+            from hydrone_gym.rendering.frame import Painter
+            from hydrone_gym.rendering.window import Window
 
-    def __post_init__(self) -> None:
-        """Check every option."""
-        if self.camera not in CAMERAS:
-            raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
-        if not _is_size(self.size):
-            raise ValueError(
-                f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels), got {self.size!r}"
-            )
-        object.__setattr__(self, "size", tuple(map(int, self.size)))
-
-
-def _is_size(size: Any) -> bool:
-    """Whether something is a width and a height."""
-    if not isinstance(size, tuple | list) or len(size) != 2:
-        return False
-    return all(isinstance(n, int) and not isinstance(n, bool) and LEAST <= n <= MOST and n % 2 == 0 for n in size)
-
-
-class Blank:
-    """The screen of an environment that is not drawn: it keeps nothing and shows nothing."""
+            self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
+            self._painter = Painter(view, simulation.world, simulation.vehicle)
+            self._window = Window(view.size) if mode == "human" else None
 
     def begin(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8], obstacles: NDArray[np.float64]) -> None:
         """Row n begins a flight where it is now.
@@ -60,55 +59,76 @@ class Blank:
             n: which row.
             rows: (rows,) dtype `ROW`.
             seen: (rows, M) 1 for a detected obstacle.
-            obstacles: (k, 4) spheres x, y, z, r in m, k at most M.
+            obstacles: (k, BODY), k at most M.
         """
+        self.restore(n, rows, obstacles, None)
+        self._shown = 0
+        self.update(rows, seen)
 
     def add(self, n: int, rows: np.ndarray, references: NDArray[np.float64]) -> None:
         """Row n is about to fly a period with its reference of (rows, 4), m and rad."""
+        if n in self._tracks:
+            self._tracks[n].add(rows[n : n + 1], references[n])
 
     def update(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
-        """A period has been flown."""
+        """Show what has not been shown, if there is a window, in real time.
+
+        A machine too slow for that skips pictures, never the last.
+        """
+        window = self._window
+        if self._painter is None or window is None or window.closed:
+            return
+        last = self._moment(0, rows, seen)
+        counts = range(self._shown + 1, len(last.ticks) + 1)
+        self._shown = len(last.ticks)
+        due = time.monotonic()
+        for moment in moments(last, counts, self._simulation.world.sensor_range):
+            due += TICK
+            if moment is not last and time.monotonic() > due:
+                continue
+            window.show(self._painter.paint(moment))
+            if window.closed:
+                return
+            time.sleep(max(0.0, due - time.monotonic()))
 
     def render(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
-        """Return a new picture of row n (height, width, 3), or None if it is shown in a window."""
-        logger.warn('render() draws nothing without a render_mode; give one when making it: render_mode="rgb_array"')
+        """Return a new picture of row n (height, width, 3), or show it and return None.
+
+        Raises ResetNeeded when row n has not begun an episode.
+        """
+        if self._painter is None:
+            logger.warn(
+                'render() draws nothing without a render_mode; give one when making it: render_mode="rgb_array"'
+            )
+            return None
+        if n not in self._tracks:
+            raise ResetNeeded("there is nothing to draw before the first reset: call reset()")
+        if self._window is None:
+            return self._painter.paint(self._moment(n, rows, seen))
+        self._shown -= 1
+        self.update(rows, seen)
         return None
 
-    def track(self, n: int) -> "Track | None":
+    def track(self, n: int) -> Track | None:
         """Return a copy of what row n has flown, if that is kept."""
-        return None
+        return self._tracks[n].copy() if n in self._tracks else None
 
-    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: "Track | None") -> None:
-        """Row n goes on from another state, with what was flown up to there if that is known."""
+    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
+        """Row n goes on from another state; without a track its path begins there."""
+        if self._painter is not None:
+            self._tracks[n] = Track(rows[n : n + 1], obstacles) if track is None else track.copy()
+            self._shown = len(self._tracks[n].ticks(self._simulation))
 
     def close(self) -> None:
-        """Nothing is drawn from now on."""
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+
+    def _moment(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> Moment:
+        track = self._tracks[n]
+        detected = seen[n, : len(track.obstacles)] != 0
+        clock, outcome = float(rows["ticks"][n]) * TICK, Outcome(int(rows["outcome"][n]))
+        return Moment(track.ticks(self._simulation), track.goal, track.obstacles, detected, clock, outcome)
 
 
-def new_screen(
-    mode: str | None,
-    size: tuple[int, int],
-    camera: str,
-    simulation: Simulation,
-    modes: tuple[str, ...] = MODES,
-) -> Blank:
-    """Return what draws an environment.
-
-    Args:
-        mode: of `modes`, or None to draw nothing.
-        size, camera: see `View`.
-        simulation: the environment's.
-        modes: those it knows.
-
-    Raises:
-        ValueError: an option out of range.
-        DependencyNotInstalled: mode "human" without pygame.
-    """
-    view = View(size=size, camera=camera)
-    if mode is None:
-        return Blank()
-    if mode not in modes:
-        raise ValueError(f"render_mode must be one of None, {', '.join(map(repr, modes))}, got {mode!r}")
-    from hydrone_gym.rendering.screen import Screen
-
-    return Screen(view, simulation, window=mode == "human")
+new_screen = Screen  # what environments call

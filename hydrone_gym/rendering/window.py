@@ -8,8 +8,6 @@ from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
-_TITLE = "hydrone_gym"
-
 
 class Window:
     """Shows pictures until it is closed, by its user or by the program.
@@ -30,39 +28,35 @@ class Window:
         """Look for pygame; the window opens with its first picture."""
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # it would stand in the output of programs
         try:
-            import pygame  # noqa: F401
+            import pygame
         except ImportError as error:
             raise DependencyNotInstalled(
                 'render_mode="human" needs pygame, part of the extra "render": pip install "hydrone-gym[render]"'
             ) from error
-        self.size = size
+        self.size, self._pygame = size, pygame
         self.closed = False
         self._surface: Any = None
 
     def show(self, image: NDArray[np.uint8]) -> None:
         """Show a picture (height, width, 3); a window that its user has closed stays closed."""
-        import pygame
-
         if self.closed or (self._surface is None and not self._open()):
             return
-        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+        if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
             self.close()
             return
-        pygame.surfarray.blit_array(self._surface, image.swapaxes(0, 1))
-        pygame.display.flip()
+        self._pygame.surfarray.blit_array(self._surface, image.swapaxes(0, 1))
+        self._pygame.display.flip()
 
     def _open(self) -> bool:
         """Open the window; return whether there is one now."""
-        import pygame
-
         try:
-            pygame.display.init()
-            self._surface = pygame.display.set_mode(self.size)
-        except pygame.error as error:
+            self._pygame.display.init()
+            self._surface = self._pygame.display.set_mode(self.size)
+        except self._pygame.error as error:
             logger.warn(f'render_mode="human" shows nothing: {error}')
             self.closed = True
             return False
-        pygame.display.set_caption(_TITLE)
+        self._pygame.display.set_caption("hydrone_gym")
         Window._shown += 1
         return True
 
@@ -74,9 +68,7 @@ class Window:
         self._surface = None
         Window._shown -= 1
         if Window._shown == 0:
-            import pygame
-
-            pygame.display.quit()
+            self._pygame.display.quit()
 
     def __getstate__(self) -> dict[str, Any]:
         return {"size": self.size, "closed": True, "_surface": None}

@@ -1,21 +1,45 @@
 """The one kernel: advance every lane of a block by ticks of one period, in closed loop.
 
-Reference ramp, control, dynamics and energy every 10 ms; swept collision, sensing, bounds, crossings, arrival and
-divergence every tick of 50 ms. The environment's step, a row of the vector environment and the planner's tree edge all
-run this code, so what the planner predicts is what the environment does.
+Reference ramp, control, dynamics and energy every 10 ms; swept collision, bounds, crossings, arrival and divergence
+every tick of 50 ms. The environment's step, a row of the vector environment and the planner's tree edge all call this
+code, so what the planner predicts is what the environment does.
 """
 
-import numpy as np
+import functools
+from typing import Any
 
-from hydrone_gym._jit import inlined
+import numpy as np
+from numba import types
+
+from hydrone_gym._jit import inlined, unit
+from hydrone_gym._memory import gather, scatter, select
+from hydrone_gym.control import laws
 from hydrone_gym.control.law import control
-from hydrone_gym.control.reference import Integral, Reference
+from hydrone_gym.control.reference import Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
-from hydrone_gym.physics.kinematics import attitude_of
+from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
 from hydrone_gym.physics.rotors import shaft_power
 from hydrone_gym.physics.trigonometry import wrap
-from hydrone_gym.simulation.block import LOGGED_CROSSINGS, keep_or_restore, load_state, save_lane, store_state
 from hydrone_gym.simulation.outcome import COLLISION, DIVERGED, GOAL, OUT_OF_BOUNDS, ROUGH_TRANSITION, RUNNING
+from hydrone_gym.simulation.storage import (
+    AT,
+    CLEARANCE,
+    CROSSINGS,
+    ENERGY,
+    FLOWN_AT,
+    LANE_AT,
+    LOG,
+    LOG_ENTRY,
+    LOGGED_CROSSINGS,
+    OUTCOME,
+    Crossing,
+    CrossingEntry,
+    Episode,
+    Flown,
+    Point,
+    Pose,
+    model_of,
+)
 from hydrone_gym.surface import is_air
 from hydrone_gym.world.bodies import inverse_square, path_distance
 
@@ -29,64 +53,72 @@ COS_TILT_BOUND = 0.05  # 87 degrees: Euler angles are singular at 90
 
 
 @inlined
-def substep(b, i, fraction, inverse_period, model):
+def reference_at(b, i, lanes, fraction, inverse_period):
+    """Return lane i's moving reference. Never accumulated: it is the same number however the period is cut up."""
+    old = gather(b, AT.reference, i, lanes, Pose)
+    move = gather(b, LANE_AT.move, i, lanes, Pose)
+    return Reference(
+        old.x + move.x * fraction,
+        old.y + move.y * fraction,
+        old.z + move.z * fraction,
+        wrap(old.psi + move.psi * fraction),
+        move.x * inverse_period,
+        move.y * inverse_period,
+        move.z * inverse_period,
+    )
+
+
+@inlined
+def substep(b, i, lanes, fraction, inverse_period, model):
     """Advance lane i by one physics step; `fraction` is how far the reference has moved by its end."""
-    state = load_state(b, i)
+    state = gather(b, FLOWN_AT.state, i, lanes, State)
+    integral = gather(b, FLOWN_AT.integral, i, lanes, Integral)
     attitude = attitude_of(state)
     air = is_air(state.z)
     medium = medium_at(model.vehicle, air)
     vertical = abs(state.z) <= model.world.zone and model.world.vertical_mode > 0.0
-    # never accumulated: old + move * fraction is the same number however the period is cut up
-    reference = Reference(
-        b.old_x[i] + b.move_x[i] * fraction,
-        b.old_y[i] + b.move_y[i] * fraction,
-        b.old_z[i] + b.move_z[i] * fraction,
-        wrap(b.old_psi[i] + b.move_psi[i] * fraction),
-        b.move_x[i] * inverse_period,
-        b.move_y[i] * inverse_period,
-        b.move_z[i] * inverse_period,
-    )
-    integral = Integral(b.integral_z[i], b.integral_phi[i], b.integral_theta[i], b.integral_psi[i])
-    speeds, integral = control(state, attitude, integral, reference, vertical, model, medium, air, DT)
+    rates = euler_rates(attitude, state.p, state.q, state.r)
+    reference = reference_at(b, i, lanes, fraction, inverse_period)
+    now = Instant(state, attitude, rates, reference, vertical, air, medium)
+    speeds, integral = control(now, integral, model, DT)
     new = step(state, attitude, speeds, model.vehicle, medium, air, DT)
-    b.energy[i] += shaft_power(medium, speeds) * DT
+    scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + shaft_power(medium, speeds) * DT)
     crossed = air != is_air(new.z)
-    b.integral_z[i] = 0.0 if crossed else integral.z
-    b.integral_phi[i] = 0.0 if crossed else integral.phi
-    b.integral_theta[i] = 0.0 if crossed else integral.theta
-    b.integral_psi[i] = 0.0 if crossed else integral.psi
-    note_crossing(b, i, crossed, air, new, attitude)
-    store_state(b, i, new)
+    integral = select(crossed, Integral(0.0, 0.0, 0.0, 0.0), integral)
+    scatter(b, FLOWN_AT.integral, i, lanes, integral)
+    note_crossing(b, i, lanes, crossed, new, attitude)
+    scatter(b, FLOWN_AT.state, i, lanes, new)
 
 
 @inlined
-def note_crossing(b, i, crossed, air, new, attitude):
+def note_crossing(b, i, lanes, crossed, new, attitude):
     """Remember this tick's crossing: its last direction and its worst lateral speed and tilt."""
     speed2 = new.vx * new.vx + new.vy * new.vy
     cosine = attitude.c_phi * attitude.c_theta
-    b.crossed[i] += 1.0 if crossed else 0.0
-    b.cross_direction[i] = (-1.0 if air else 1.0) if crossed else b.cross_direction[i]
-    b.cross_vz[i] = new.vz if crossed else b.cross_vz[i]
-    b.cross_speed2[i] = speed2 if crossed and not speed2 <= b.cross_speed2[i] else b.cross_speed2[i]
-    b.cross_cos[i] = cosine if crossed and not cosine >= b.cross_cos[i] else b.cross_cos[i]
+    c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
+    noted = Crossing(
+        c.number + 1.0,
+        1.0 if is_air(new.z) else -1.0,
+        c.speed2 if speed2 <= c.speed2 else speed2,
+        c.cos_tilt if cosine >= c.cos_tilt else cosine,
+        new.vz,
+    )
+    scatter(b, LANE_AT.crossing, i, lanes, select(crossed, noted, c))
 
 
 @inlined
-def begin_tick(b, i):
-    """Save lane i and clear what a tick collects."""
-    save_lane(b, i)
-    b.crossed[i] = 0.0
-    b.cross_speed2[i] = 0.0
-    b.cross_cos[i] = 1.0
+def begin_tick(b, i, lanes):
+    """Keep what lane i must fall back to if it is finished already or diverges; clear what a tick collects."""
+    scatter(b, LANE_AT.saved, i, lanes, gather(b, 0, i, lanes, Flown))
+    scatter(b, LANE_AT.crossing, i, lanes, Crossing(0.0, 0.0, 0.0, 1.0, 0.0))
 
 
 @inlined
-def end_tick(b, i, model):
-    """Judge lane i: outcome, and the state it keeps. A finished lane stays frozen where it ended."""
-    w = model.world
-    s = load_state(b, i)
-    before = b.outcome[i]
-    running = before == RUNNING
+def judge(b, i, lanes, w):
+    """Return the outcome of lane i at the end of a tick, and whether its numbers mean anything; `w`: `WorldParams`."""
+    s = gather(b, FLOWN_AT.state, i, lanes, State)
+    c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
+    goal = gather(b, AT.goal, i, lanes, Point)
     attitude = attitude_of(s)
     speed2 = s.vx * s.vx + s.vy * s.vy + s.vz * s.vz
     rate2 = s.p * s.p + s.q * s.q + s.r * s.r
@@ -96,80 +128,125 @@ def end_tick(b, i, model):
     inside = (
         w.x_min <= s.x and s.x <= w.x_max and w.y_min <= s.y and s.y <= w.y_max and w.z_min <= s.z and s.z <= w.z_max
     )
-    rough = b.crossed[i] > 0.0 and w.rough_fails > 0.0
-    rough = rough and (b.cross_speed2[i] > w.rough_speed * w.rough_speed or b.cross_cos[i] < w.rough_cos_tilt)
-    gx, gy, gz = s.x - b.goal_x[i], s.y - b.goal_y[i], s.z - b.goal_z[i]
+    rough = c.number > 0.0 and w.rough_fails > 0.0
+    rough = rough and (c.speed2 > w.rough_speed * w.rough_speed or c.cos_tilt < w.rough_cos_tilt)
+    gx, gy, gz = s.x - goal.x, s.y - goal.y, s.z - goal.z
     arrived = gx * gx + gy * gy + gz * gz <= w.goal_radius * w.goal_radius
     outcome = GOAL if arrived else RUNNING
     outcome = ROUGH_TRANSITION if rough else outcome
     outcome = outcome if inside else OUT_OF_BOUNDS
-    outcome = COLLISION if b.clearance[i] <= 0.0 else outcome
-    outcome = outcome if sane else DIVERGED
-    b.outcome[i] = outcome if running else before
-    b.ticks[i] += 1.0 if running else 0.0
-    b.crossed[i] = b.crossed[i] if running and sane else 0.0
-    keep_or_restore(b, i, running and sane)
+    outcome = COLLISION if gather(b, CLEARANCE, i, lanes, float) <= 0.0 else outcome
+    return outcome if sane else DIVERGED, sane
 
 
 @inlined
-def sweep(b, i, j, lanes, obstacles, closest, radius):
+def end_tick(b, i, lanes, world):
+    """Judge lane i: outcome, and the state it keeps. A finished lane stays frozen where it ended."""
+    outcome, sane = judge(b, i, lanes, world)
+    episode = gather(b, AT.episode, i, lanes, Episode)
+    running = episode.outcome == RUNNING
+    keep = running and sane
+    scatter(
+        b,
+        AT.episode,
+        i,
+        lanes,
+        Episode(
+            episode.ticks + (1.0 if running else 0.0),
+            episode.clearance,
+            outcome if running else episode.outcome,
+            episode.crossings,
+        ),
+    )
+    count = gather(b, LANE_AT.crossing, i, lanes, float)
+    scatter(b, LANE_AT.crossing, i, lanes, count if keep else 0.0)
+    saved = gather(b, LANE_AT.saved, i, lanes, Flown)
+    scatter(b, 0, i, lanes, select(keep, gather(b, 0, i, lanes, Flown), saved))
+
+
+@inlined
+def sweep(b, i, lanes, j, obstacles, closest, radius):
     """Measure lane i's path of this tick against obstacle j."""
-    k = 4 * j * lanes + i
-    a = (b.saved_x[i], b.saved_y[i], b.saved_z[i])
-    d = (b.x[i] - a[0], b.y[i] - a[1], b.z[i] - a[2])
-    body = (obstacles[k], obstacles[k + lanes], obstacles[k + 2 * lanes], obstacles[k + 3 * lanes])
-    distance = path_distance(a, d, b.inverse_length2[i], body)
-    running = b.outcome[i] == RUNNING
-    near = closest[j * lanes + i]
-    closest[j * lanes + i] = distance if running and distance < near else near
-    clearance = distance - radius
-    b.clearance[i] = clearance if running and clearance < b.clearance[i] else b.clearance[i]
+    a = gather(b, LANE_AT.saved, i, lanes, Point)  # a state begins with the position
+    s = gather(b, 0, i, lanes, Point)
+    body = gather(obstacles, 4 * j, i, lanes, Pose)
+    distance = path_distance(a, (s.x - a.x, s.y - a.y, s.z - a.z), b[LANE_AT.inverse_length2 * lanes + i], body)
+    running = gather(b, OUTCOME, i, lanes, float) == RUNNING
+    near, least, clearance = (
+        gather(closest, j, i, lanes, float),
+        gather(b, CLEARANCE, i, lanes, float),
+        distance - radius,
+    )
+    scatter(closest, j, i, lanes, distance if running and distance < near else near)
+    scatter(b, CLEARANCE, i, lanes, clearance if running and clearance < least else least)
 
 
 @inlined
-def log_crossings(b, log, lanes):
-    """Write this tick's crossings to the rows' logs: rare, so not vectorised."""
+def measure_path(b, i, lanes):
+    """Work out what all obstacles share of lane i's path of this tick."""
+    a, s = gather(b, LANE_AT.saved, i, lanes, Point), gather(b, 0, i, lanes, Point)
+    scatter(b, LANE_AT.inverse_length2, i, lanes, inverse_square(s.x - a.x, s.y - a.y, s.z - a.z))
+
+
+@inlined
+def log_crossings(b, lanes):
+    """Write this tick's crossings to the lanes' logs: rare, so not vectorised."""
     for i in range(lanes):
-        if b.crossed[i] > 0.0:
-            slot = int(b.crossings[i])
+        c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
+        if c.number > 0.0:
+            episode = gather(b, AT.episode, i, lanes, Episode)
+            slot = int(episode.crossings)
             if slot < LOGGED_CROSSINGS:
-                log[i, slot, 0] = b.ticks[i] * TICK
-                log[i, slot, 1] = b.cross_direction[i]
-                log[i, slot, 2] = np.sqrt(b.cross_speed2[i])
-                log[i, slot, 3] = np.arccos(min(b.cross_cos[i], 1.0))
-                log[i, slot, 4] = b.cross_vz[i]
-            b.crossings[i] += 1.0
+                entry = CrossingEntry(episode.ticks * TICK, c.direction, np.sqrt(c.speed2), min(c.cos_tilt, 1.0), c.vz)
+                scatter(b, LOG + slot * LOG_ENTRY, i, lanes, entry)
+            scatter(b, CROSSINGS, i, lanes, episode.crossings + 1.0)
 
 
 @inlined
-def advance(block, log, obstacles, closest, count, model, first, last, ticks):
+def advance(b, lanes, obstacles, closest, count, model, first, last, ticks):
     """Advance all lanes through ticks [first, last) of a period of `ticks` ticks.
 
     Args:
-        block: from `new_block`; references already loaded as old and move.
-        log: (lanes, LOGGED_CROSSINGS, 5) crossing log.
-        obstacles: flat, entry (j, c) of lane i at ``(4 j + c) lanes + i``: x, y, z, radius in m.
-        closest: flat (count * lanes), least distance so far from each obstacle's surface, m; updated.
+        b: a block from `new_block`; rows and the moves of their references already loaded.
+        lanes: how many, a constant of the compilation.
+        obstacles: entry (j, c) of lane i at ``(4 j + c) lanes + i``: x, y, z, radius in m.
+        closest: (count * lanes), least distance so far from each obstacle's surface, m; updated.
         count: number of obstacles.
         model: `Model`.
         first, last, ticks: which part of the period.
     """
-    b = block[0]
-    lanes = b.x.size
     inverse_substeps = 1.0 / (ticks * SUBSTEPS)
     inverse_period = 1.0 / (ticks * TICK)
+    # all lanes; were it a constant to LLVM, short loops would be unrolled to scalars before they could be vectorised
+    width = lanes if lanes == 1 or ticks > 0 else 0
     for tick in range(first, last):
-        for i in range(lanes):
-            begin_tick(b, i)
+        for i in range(width):
+            begin_tick(b, i, lanes)
         for sub in range(SUBSTEPS):
             fraction = (tick * SUBSTEPS + sub + 1) * inverse_substeps
-            for i in range(lanes):
-                substep(b, i, fraction, inverse_period, model)
-        for i in range(lanes):
-            b.inverse_length2[i] = inverse_square(b.x[i] - b.saved_x[i], b.y[i] - b.saved_y[i], b.z[i] - b.saved_z[i])
+            for i in range(width):
+                substep(b, i, lanes, fraction, inverse_period, model)
+        for i in range(width):
+            measure_path(b, i, lanes)
         for j in range(count):
-            for i in range(lanes):
-                sweep(b, i, j, lanes, obstacles, closest, model.vehicle.radius)
-        for i in range(lanes):
-            end_tick(b, i, model)
-        log_crossings(b, log, lanes)
+            for i in range(width):
+                sweep(b, i, lanes, j, obstacles, closest, model.vehicle.radius)
+        for i in range(width):
+            end_tick(b, i, lanes, model.world)
+        log_crossings(b, lanes)
+
+
+@functools.cache
+def compiled(law: str, lanes: int) -> Any:
+    """Return `advance` compiled for a law and a number of lanes; its `address` is what kernels call.
+
+    Called as ``call(address, block, obstacles, closest, values, count, first, last, ticks)``.
+    """
+    gains = laws.named_law(law).gains
+
+    def unit_of_law(block, obstacles, closest, values, count, first, last, ticks):
+        advance(block, lanes, obstacles, closest, count, model_of(values, gains), first, last, ticks)
+
+    numbers, whole = types.CPointer(types.float64), types.int64
+    signature = types.void(numbers, numbers, numbers, numbers, whole, whole, whole, whole)
+    return unit(signature, unit_of_law, __name__)

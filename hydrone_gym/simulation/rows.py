@@ -1,111 +1,69 @@
-"""Rows: the plain storage of vehicles, and the drivers that run them through the kernel."""
+"""The driver that runs rows through the kernel, a block of lanes at a time."""
+
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
+from hydrone_gym._memory import call, gather, pointer, scatter
 from hydrone_gym.physics.trigonometry import wrap
-from hydrone_gym.simulation.advance import advance
-from hydrone_gym.simulation.block import ROW
-from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.simulation.storage import AT, CROSSINGS, LANE_AT, LOG, LOG_ENTRY, LOGGED_CROSSINGS, REFERENCE, Pose
 
 
-def new_rows(count: int) -> np.ndarray:
-    """Return zeroed storage for a number of vehicles, dtype `ROW`."""
-    return np.zeros(count, ROW)
+class Engine(NamedTuple):
+    """What advances a block: the compiled kernel with its constants and working storage, for one thread."""
 
-
-@inlined
-def load_vehicle(b, i, state, integral, old, new):
-    """Put a vehicle into lane i: state (12), controller memory (4), and the reference's move over the period."""
-    b.x[i], b.y[i], b.z[i] = state[0], state[1], state[2]
-    b.phi[i], b.theta[i], b.psi[i] = state[3], state[4], state[5]
-    b.vx[i], b.vy[i], b.vz[i] = state[6], state[7], state[8]
-    b.p[i], b.q[i], b.r[i] = state[9], state[10], state[11]
-    b.integral_z[i], b.integral_phi[i], b.integral_theta[i], b.integral_psi[i] = (
-        integral[0],
-        integral[1],
-        integral[2],
-        integral[3],
-    )
-    b.old_x[i], b.old_y[i], b.old_z[i], b.old_psi[i] = old[0], old[1], old[2], old[3]
-    b.move_x[i] = new[0] - old[0]
-    b.move_y[i] = new[1] - old[1]
-    b.move_z[i] = new[2] - old[2]
-    b.move_psi[i] = wrap(new[3] - old[3])
+    address: int  # of `hydrone_gym.simulation.advance.compiled`
+    lanes: int
+    ticks: int  # of a period
+    values: NDArray[np.float64]  # from `pack_model`
+    block: NDArray[np.float64]  # from `new_block`
 
 
 @inlined
-def store_vehicle(b, i, state, integral):
-    """Take a vehicle's state (12) and controller memory (4) out of lane i."""
-    state[0], state[1], state[2] = b.x[i], b.y[i], b.z[i]
-    state[3], state[4], state[5] = b.phi[i], b.theta[i], b.psi[i]
-    state[6], state[7], state[8] = b.vx[i], b.vy[i], b.vz[i]
-    state[9], state[10], state[11] = b.p[i], b.q[i], b.r[i]
-    integral[0], integral[1] = b.integral_z[i], b.integral_phi[i]
-    integral[2], integral[3] = b.integral_theta[i], b.integral_psi[i]
+def set_move(b, i, lanes, new):
+    """Let lane i's reference move to a `Pose` over the period."""
+    old = gather(b, AT.reference, i, lanes, Pose)
+    move = Pose(new.x - old.x, new.y - old.y, new.z - old.z, wrap(new.psi - old.psi))
+    scatter(b, LANE_AT.move, i, lanes, move)
 
 
 @inlined
-def load_row(b, i, row, reference):
-    """Put a row into lane i, with the reference it moves to over the period."""
-    load_vehicle(b, i, row.state, row.integral, row.reference, reference)
-    b.goal_x[i], b.goal_y[i], b.goal_z[i] = row.goal[0], row.goal[1], row.goal[2]
-    b.ticks[i], b.energy[i], b.clearance[i] = row.ticks, row.energy, row.clearance
-    b.outcome[i], b.crossings[i] = row.outcome, row.crossings
-
-
-@inlined
-def store_row(b, i, row):
-    """Put lane i back into its row; the reference is the driver's business."""
-    store_vehicle(b, i, row.state, row.integral)
-    row.ticks, row.energy, row.clearance = b.ticks[i], b.energy[i], b.clearance[i]
-    row.outcome, row.crossings = b.outcome[i], b.crossings[i]
-
-
-@inlined
-def copy_log(source, log, i):
-    """Copy a row's crossing log to lane i's. Loops: array assignment costs seconds of compiling."""
-    for slot in range(source.shape[0]):
-        for c in range(source.shape[1]):
-            log[i, slot, c] = source[slot, c]
-
-
-@inlined
-def restore_log(log, i, destination):
-    """Copy lane i's crossing log back to its row's."""
-    for slot in range(destination.shape[0]):
-        for c in range(destination.shape[1]):
-            destination[slot, c] = log[i, slot, c]
+def logged(row):
+    """How many numbers of a row's log of crossings mean something."""
+    return LOG_ENTRY * int(min(row[CROSSINGS], LOGGED_CROSSINGS))
 
 
 @kernel
-def advance_rows(rows, references, obstacles, closest, count, values, first, last, ticks, block, log):
+def advance_rows(engine, rows, references, obstacles, closest, count, first, last):
     """Advance rows in place through ticks [first, last) of a period, a block of lanes at a time.
 
     Args:
+        engine: `Engine`.
         rows: (n,) dtype `ROW`.
         references: (n, 4) what the reference moves to by the end of the period: m, m, m, rad.
         obstacles: (blocks, 4 * count * lanes) lane-major, see `advance`.
         closest: (blocks, count * lanes), updated.
         count: number of obstacles.
-        values: packed `Model`.
-        first, last, ticks: which part of the period; the rows' references move on when last == ticks.
-        block, log: working storage of one block.
+        first, last: which part of the period; the rows' references move on when last is its end.
     """
-    model = unpack_model(values)
-    lanes = block[0].x.size
-    n = rows.size
+    lanes, n, b = engine.lanes, rows.size, pointer(engine.block)
     for k in range((n + lanes - 1) // lanes):
         start = k * lanes
         for i in range(lanes):
             # lanes beyond the last row repeat it and are thrown away
             row = min(start + i, n - 1)
-            load_row(block[0], i, rows[row], references[row])
-            copy_log(rows[row].crossing_log, log, i)
-        advance(block, log, obstacles[k], closest[k], count, model, first, last, ticks)
+            source = pointer(rows[row])
+            for c in range(LOG + logged(source)):
+                b[c * lanes + i] = source[c]
+            set_move(b, i, lanes, gather(references[row], 0, 0, 1, Pose))
+        call(engine.address, engine.block, obstacles[k], closest[k], engine.values, count, first, last, engine.ticks)
         for i in range(min(lanes, n - start)):
-            store_row(block[0], i, rows[start + i])
-            restore_log(log, i, rows[start + i].crossing_log)
-            if last == ticks:
-                for c in range(4):
-                    rows[start + i].reference[c] = references[start + i, c]
+            target = pointer(rows[start + i])
+            for c in range(LOG):
+                target[c] = b[c * lanes + i]
+            for c in range(LOG, LOG + logged(target)):
+                target[c] = b[c * lanes + i]
+            if last == engine.ticks:
+                scatter(target, REFERENCE, 0, 1, gather(references[start + i], 0, 0, 1, Pose))

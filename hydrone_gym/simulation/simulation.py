@@ -1,12 +1,14 @@
 """Python's handle on the kernel: constants packed once, working storage kept, rows advanced in place."""
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, Self
 
-from hydrone_gym.simulation.advance import DT, SUBSTEPS, TICK
-from hydrone_gym.simulation.block import CROSSING_FIELDS, LANES, LOGGED_CROSSINGS, new_block
-from hydrone_gym.simulation.model import pack_model
-from hydrone_gym.simulation.rows import advance_rows, new_rows
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hydrone_gym.control.laws import named_law
+from hydrone_gym.simulation.advance import DT, SUBSTEPS, TICK, compiled
+from hydrone_gym.simulation.rows import Engine, advance_rows
+from hydrone_gym.simulation.storage import LANES, new_block, new_rows, pack_model
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
 
@@ -27,18 +29,38 @@ class Simulation:
         world: the world.
         period: seconds between references, a multiple of 0.05.
         lanes: 1 for a single row, 16 for batches.
+        law: name of the control law that flies it.
+
+    Raises:
+        ValueError: a period that is no multiple of the tick, an unknown law.
     """
 
-    def __init__(self, vehicle: Vehicle, world: World, period: float = 0.5, lanes: int = 1) -> None:
-        """Pack the model and make the working storage."""
+    def __init__(self, vehicle: Vehicle, world: World, period: float = 0.5, lanes: int = 1, law: str = "paper") -> None:
+        """Pack the model."""
         self.vehicle = vehicle
         self.world = world
         self.period = float(period)
         self.ticks = ticks_in(period)
         self.lanes = lanes
-        self.values = pack_model(vehicle, world)
-        self._block = new_block(lanes)
-        self._log = np.zeros((lanes, LOGGED_CROSSINGS, len(CROSSING_FIELDS)))
+        self.law = law
+        self.values = pack_model(vehicle, world, named_law(law))
+        self._engine: Engine | None = None
+
+    @property
+    def engine(self) -> Engine:
+        """What kernels advance blocks with; compiled, or loaded, when it is first asked for."""
+        if self._engine is None:
+            address = compiled(self.law, self.lanes).address
+            self._engine = Engine(address, self.lanes, self.ticks, self.values, new_block(self.lanes))
+        return self._engine
+
+    def twin(self) -> Self:
+        """Return another simulation of the same model, with working storage of its own."""
+        return type(self)(self.vehicle, self.world, self.period, self.lanes, self.law)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what holds for this process only: the kernel's address."""
+        return {**self.__dict__, "_engine": None}
 
     def advance(
         self,
@@ -52,16 +74,14 @@ class Simulation:
     ) -> None:
         """Advance rows in place through ticks [first, last) of a period; see `advance_rows` for the layout."""
         end = self.ticks if last is None else last
-        advance_rows(
-            rows, references, obstacles, closest, count, self.values, first, end, self.ticks, self._block, self._log
-        )
+        advance_rows(self._engine or self.engine, rows, references, obstacles, closest, count, first, end)
 
 
 def trajectory(
     simulation: Simulation,
     row: np.ndarray,
-    references: NDArray[np.float64],
-    obstacles: NDArray[np.float64] | None = None,
+    references: ArrayLike,
+    obstacles: ArrayLike | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], np.ndarray]:
     """Play a sequence of references from a row and sample every tick, with the same numbers as whole periods give.
 

@@ -31,7 +31,7 @@ class CruiseSpeeds(NamedTuple):
 def cruise_speeds(envelope: Envelope) -> CruiseSpeeds:
     """Return the speeds that flights average, from the limits of a law."""
     limits = envelope.cruise, envelope.climb, envelope.surge, envelope.dive
-    return CruiseSpeeds(*(_CRUISE * limit for limit in limits), envelope.zone)
+    return CruiseSpeeds._make([*(_CRUISE * limit for limit in limits), envelope.zone])
 
 
 @inlined

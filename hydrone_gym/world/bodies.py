@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined
 
 BODY = 4  # numbers a body
+NOWHERE = 1e160  # m: its square overflows, so a body there is at distance inf
+UNIT = np.array([0.0, 0.0, 0.0, 1.0])  # the body that all others are moved and scaled copies of
 
 
 @inlined
@@ -70,3 +72,47 @@ def gaps_along(a: NDArray[np.float64], b: NDArray[np.float64], bodies: NDArray[n
     along, offset = b - a, bodies[:, :3] - a
     share = np.clip(offset @ along / max(float(along @ along), sys.float_info.min), 0.0, 1.0)
     return np.linalg.norm(offset - share[:, None] * along, axis=1) - bodies[:, 3]
+
+
+def distances(points: NDArray[np.float64], bodies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distances (N, M) in m from points (N, 3) to the surfaces of bodies, negative inside."""
+    return np.linalg.norm(points[:, None] - bodies[:, :3], axis=2) - bodies[:, 3]
+
+
+def placed(bodies: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the middles (M, 3) of bodies in m, and how many times as large as `UNIT` they are (M,)."""
+    return bodies[:, :3], bodies[:, 3]
+
+
+def bounds(bodies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lower and the upper corner of the box around each body, (M, 2, 3) in m."""
+    return bodies[:, None, :3] + np.array([[-1.0], [1.0]]) * bodies[:, None, 3:]
+
+
+def support(body: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where the surface of a body faces unit directions, (n, 3) in m: the points farthest that way."""
+    return body[:3] + body[3] * directions
+
+
+def section(body: NDArray[np.float64], z: float, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return so many points round a body at a height (m), and the unit normals there, each (n, 3); none beyond it."""
+    height = (z - body[2]) / body[3]
+    turns = np.linspace(0.0, 2.0 * np.pi, count if abs(height) < 1.0 else 0, endpoint=False)
+    normals = np.column_stack((np.cos(turns), np.sin(turns), np.full(len(turns), height)))
+    normals[:, :2] *= np.sqrt(max(1.0 - height * height, 0.0))
+    return support(body, normals), normals
+
+
+def mesh(body: NDArray[np.float64], rings: int = 16) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return a body as triangles: vertices (n, 3) in m, and faces (m, 3), counter-clockwise as seen from outside."""
+    sections = 2 * rings
+    rise, turn = np.meshgrid(np.linspace(0.0, np.pi, rings + 1), 2.0 * np.pi * np.arange(sections) / sections)
+    directions = np.stack((np.sin(rise) * np.cos(turn), np.sin(rise) * np.sin(turn), -np.cos(rise)), axis=2)
+    return support(body, directions.swapaxes(0, 1).reshape(-1, 3)), belt(rings, sections)
+
+
+def belt(rings: int, sections: int) -> NDArray[np.int64]:
+    """Return the triangles (n, 3) between rings, one more than `rings`, of so many vertices each, from low to high."""
+    a = np.arange(rings * sections)
+    b = a - a % sections + (a + 1) % sections
+    return np.concatenate((np.stack((a, b, b + sections), 1), np.stack((a, b + sections, a + sections), 1)))

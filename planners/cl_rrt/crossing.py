@@ -9,17 +9,15 @@ import numpy as np
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
-from hydrone_gym.simulation.advance import TICK
-from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.surface import is_air
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
-from planners.cl_rrt.references import AIR_GATE, WATER_GATE, inside
-from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING
+from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING, node_state
 from planners.clearance import clearance_between
+from planners.stop_check import AIR_GATE, WATER_GATE, inside
 
 _SETTLE_LIMIT = 9.0  # s
 _CROSS_LIMIT = 12.0  # s
 _BEYOND = 1.3  # m: where the reference goes on the other side
-STOP_TIME = 0.45  # s: stop distance over speed in air
 # Lateral and vertical speed (m/s) at which the vehicle may leave the gate
 _STILL_AIR, _LEVEL_AIR = 0.3, 0.3
 _STILL_WATER, _LEVEL_WATER = 1.0, 0.8
@@ -28,6 +26,7 @@ _HEIGHT = 0.2  # m from the gate
 _FACING = 0.15  # rad
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _CLEAR_OF_ZONE = 0.05  # m
+_AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate
 
 
 @inlined
@@ -44,73 +43,85 @@ def facing(x, y, to_x, to_y, psi):
 
 
 @inlined
-def column_is_free(work, x, y, radius, margin):
+def column_is_free(p, x, y):
     """Whether a vertical path through the zone clears every known obstacle."""
-    above, below = (x, y, AIR_GATE), (x, y, -WATER_GATE)
-    return clearance_between(above, below, work.obstacles, 0, work.closest.size, radius) >= margin
+    return clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), p.check.lane, 0, p.check.radius) >= p.margin
 
 
 @inlined
-def at_gate(state, x, y, gate, psi):
-    """Whether a vehicle may leave the gate in column (x, y): so slow that it moves only vertically inside the zone.
+def at_gate(s, column):
+    """Whether a vehicle may leave the gate of a column (x, y, gate, psi): too slow to move sideways in the zone.
 
     From below it need not lie still: water brakes it before the zone, and it cannot hold a place sideways anyway.
     """
-    down = gate > 0.0
+    x, y, gate, psi = column
+    down = is_air(gate)
     still, level = (_STILL_AIR, _LEVEL_AIR) if down else (_STILL_WATER, _LEVEL_WATER)
-    slow = state[6] * state[6] + state[7] * state[7] < still * still and abs(state[8]) < level
-    dx, dy = state[0] - x, state[1] - y
-    placed = dx * dx + dy * dy < _APART * _APART and abs(wrap(state[5] - psi)) < _FACING
-    return slow and abs(state[2] - gate) < _HEIGHT and (placed or not down)
+    slow = s.vx * s.vx + s.vy * s.vy < still * still and abs(s.vz) < level
+    dx, dy = s.x - x, s.y - y
+    placed = dx * dx + dy * dy < _APART * _APART and abs(wrap(s.psi - psi)) < _FACING
+    return slow and abs(s.z - gate) < _HEIGHT and (placed or not down)
+
+
+@inlined
+def column_from(p, s, sample):
+    """Return the column (x, y, gate, psi) that a vehicle at the gate crosses in: where it stops, turned to go on."""
+    w, goal, down = p.check.world, p.check.goal, is_air(s.z)
+    ahead = p.check.envelope.stop_time if down else _AHEAD
+    x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
+    psi = s.psi
+    if down:
+        psi = facing(x, y, sample.x, sample.y, psi)
+        psi = facing(x, y, goal.x, goal.y, psi) if psi == s.psi else psi
+    return x, y, AIR_GATE if down else -WATER_GATE, psi
 
 
 @routine
-def cross(work, values, goal, source, size, sample_x, sample_y, objective, margin, ticks):
-    """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
-    model = unpack_model(values)
-    period = ticks * TICK
-    s = work.nodes[source].state
-    down = s[2] > 0.0
-    ahead = STOP_TIME if down else 0.1
-    x = inside(s[0] + ahead * s[6], model.world.x_min, model.world.x_max)
-    y = inside(s[1] + ahead * s[7], model.world.y_min, model.world.y_max)
-    if not column_is_free(work, x, y, model.vehicle.radius, margin):
-        return size
-    psi = s[5]
-    if down:
-        psi = facing(x, y, sample_x, sample_y, psi)
-        psi = facing(x, y, goal[0], goal[1], psi) if psi == s[5] else psi
-    gate = AIR_GATE if down else -WATER_GATE
-    current, first = source, size
-    settled = False
-    for _ in range(int(_SETTLE_LIMIT / period)):
-        settled = at_gate(work.nodes[current].state, x, y, gate, psi)
-        if settled or size >= work.path.size - 1:
+def settle(p, source, size, column):
+    """Append edges that come to rest at the gate; return (last node or -1 if they fail, new size)."""
+    current = source
+    for _ in range(int(_SETTLE_LIMIT / p.check.period)):
+        if at_gate(node_state(p, current), column):
+            return current, size
+        if size >= p.path.size - 1:
             break
-        result, crossed = edge(work, values, goal, current, size, x, y, gate, psi, margin, ticks)
-        if result == BLOCKED or crossed:
-            return first
-        adopt(work, goal, objective, current, size, SETTLING, result == ARRIVED)
-        work.nodes[size].next = size + 1
+        ended, flown = edge(p, current, size, column, p.margin)
+        if ended == BLOCKED or flown.crossings > 0.0:
+            break
+        adopt(p, current, size, SETTLING, ended, flown)
+        p.nodes[size].next = size + 1
         current = size
         size += 1
-        if result == ARRIVED:
-            work.nodes[current].kind = OPEN
-            return size
-    if not settled:
+        if ended == ARRIVED:
+            p.nodes[current].kind = OPEN
+            return current, size
+    return -1, size
+
+
+@routine
+def cross(p, source, size, sample):
+    """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
+    w, s, first = p.check.world, node_state(p, source), size
+    column = column_from(p, s, sample)
+    x, y, gate, psi = column
+    down = is_air(gate)
+    if not column_is_free(p, x, y):
         return first
-    beyond = clamp(-_BEYOND if down else _BEYOND, model.world.z_min + 0.1, model.world.z_max - 0.1)
-    for _ in range(int(_CROSS_LIMIT / period)):
-        if size >= work.path.size - 1:
+    current, size = settle(p, source, size, column)
+    if current < 0 or p.nodes[current].goal:
+        return size if current >= 0 else first
+    beyond = clamp(-_BEYOND if down else _BEYOND, w.z_min + 0.1, w.z_max - 0.1)
+    for _ in range(int(_CROSS_LIMIT / p.check.period)):
+        if size >= p.path.size - 1:
             return first
-        result, _ = edge(work, values, goal, current, size, x, y, beyond, psi, margin, ticks)
-        if result == BLOCKED:
+        ended, flown = edge(p, current, size, (x, y, beyond, psi), p.margin)
+        if ended == BLOCKED:
             return first
-        z = work.nodes[size].state[2]
-        through = (z > 0.0) != down and abs(z) > model.world.zone + _CLEAR_OF_ZONE
-        kind = OPEN if through or result == ARRIVED else CROSSING
-        adopt(work, goal, objective, current, size, kind, result == ARRIVED)
-        work.nodes[size].next = -1 if kind == OPEN else size + 1
+        z = node_state(p, size).z
+        through = is_air(z) != down and abs(z) > w.zone + _CLEAR_OF_ZONE
+        kind = OPEN if through or ended == ARRIVED else CROSSING
+        adopt(p, current, size, kind, ended, flown)
+        p.nodes[size].next = -1 if kind == OPEN else size + 1
         current = size
         size += 1
         if kind == OPEN:

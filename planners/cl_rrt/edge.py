@@ -3,11 +3,12 @@
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym.simulation.advance import TICK, advance
-from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym._memory import pointer
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rows import load_vehicle, store_vehicle
+from hydrone_gym.simulation.rollout import propagate
 from planners.cl_rrt.objective import cost_to_go
+from planners.cl_rrt.tree import node_state
+from planners.stop_check import single
 
 # How an edge ended
 BLOCKED = 0
@@ -19,52 +20,45 @@ CROSSING_COS_TILT = np.cos(np.radians(2.0))
 
 
 @routine
-def edge(work, values, goal, source, slot, rx, ry, rz, psi, margin, ticks):
+def edge(p, source, slot, reference, margin):
     """Propagate node `source` over one period toward a reference and write the end to `slot`.
 
     References are rounded to single precision first, the precision of the action space, so that the environment gets
     the very numbers that were checked.
 
-    Returns (BLOCKED, FREE or ARRIVED, whether the surface was passed). BLOCKED: an obstacle within `margin` m, the
-    bounds, a rough crossing, or divergence.
+    Returns (BLOCKED, FREE or ARRIVED, the `Result`). BLOCKED: an obstacle within `margin` m, the bounds, a rough
+    crossing, or divergence.
     """
-    model = unpack_model(values)
-    work.edges[0] += 1
-    b = work.block[0]
-    start, end = work.nodes[source], work.nodes[slot]
-    rx, ry, rz, psi = float(np.float32(rx)), float(np.float32(ry)), float(np.float32(rz)), float(np.float32(psi))
-    load_vehicle(b, 0, start.state, start.integral, start.reference, (rx, ry, rz, psi))
-    b.goal_x[0], b.goal_y[0], b.goal_z[0] = goal[0], goal[1], goal[2]
-    b.ticks[0], b.energy[0], b.clearance[0], b.outcome[0], b.crossings[0] = 0.0, 0.0, np.inf, 0.0, 0.0
-    count = work.closest.size
-    advance(work.block, work.log, work.obstacles, work.closest, count, model, 0, ticks, ticks)
-    store_vehicle(b, 0, end.state, end.integral)
-    end.reference[0], end.reference[1], end.reference[2], end.reference[3] = rx, ry, rz, psi
-    crossed = b.crossings[0] > 0.0
-    if b.clearance[0] < margin:
-        return BLOCKED, crossed
-    for slot_index in range(min(int(b.crossings[0]), work.log.shape[1])):
-        tilt_cosine = np.cos(work.log[0, slot_index, 3])
-        if work.log[0, slot_index, 2] > CROSSING_SPEED or tilt_cosine < CROSSING_COS_TILT:
-            return BLOCKED, crossed
-    if b.outcome[0] == GOAL:
-        return ARRIVED, crossed
-    return FREE if b.outcome[0] == RUNNING else BLOCKED, crossed
+    p.edges[0] += 1.0
+    start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
+    rounded = single(reference[0], reference[1], reference[2], reference[3])
+    flown = propagate(p.check.lane, start, end, p.check.goal, rounded)
+    rough = flown.lateral_speed > CROSSING_SPEED or flown.cos_tilt < CROSSING_COS_TILT
+    if flown.clearance < margin or rough:
+        return BLOCKED, flown
+    if flown.outcome == GOAL:
+        return ARRIVED, flown
+    return FREE if flown.outcome == RUNNING else BLOCKED, flown
 
 
 @inlined
-def adopt(work, goal, objective, parent, slot, kind, arrived):
-    """Make the end of the edge propagated last, in `slot`, a node of the tree."""
-    node, b = work.nodes[slot], work.block[0]
-    before = work.nodes[parent]
-    s = node.state
+def adopt(p, parent, slot, kind, ended, flown):
+    """Make the end of an edge, in `slot`, a node of the tree; `ended` and `flown` are what `edge` returned."""
+    node, before = p.nodes[slot], p.nodes[parent]
+    s, a = node_state(p, slot), node_state(p, parent)
     node.parent, node.next, node.kind = parent, -1, kind
     node.dead, node.unsafe, node.tried = 0, 0, 0
-    node.goal = 1 if arrived else 0
-    dx, dy, dz = s[0] - before.state[0], s[1] - before.state[1], s[2] - before.state[2]
-    length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    seconds = b.ticks[0] * TICK
-    spent = objective.per_second * seconds + objective.per_joule * b.energy[0] + objective.per_metre * length
-    node.time = before.time + seconds
+    node.goal = 1 if ended == ARRIVED else 0
+    dx, dy, dz = s.x - a.x, s.y - a.y, s.z - a.z
+    length, o = np.sqrt(dx * dx + dy * dy + dz * dz), p.objective
+    spent = o.per_second * flown.seconds + o.per_joule * flown.energy + o.per_metre * length
+    node.time = before.time + flown.seconds
     node.cost = before.cost + spent
-    node.to_go = 0.0 if arrived else cost_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], objective)
+    node.to_go = 0.0 if ended == ARRIVED else left_to_go(p, s)
+
+
+@inlined
+def left_to_go(p, s):
+    """Cost from a place (with x, y, z in m) to the goal in an empty world."""
+    goal = p.check.goal
+    return cost_to_go(s.x, s.y, s.z, goal.x, goal.y, goal.z, p.objective)

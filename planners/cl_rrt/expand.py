@@ -1,14 +1,17 @@
 """Algorithm 1: expand the tree."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.model import unpack_model
+from hydrone_gym.surface import is_air
+from planners.cl_rrt.edge import left_to_go
 from planners.cl_rrt.extend import extend, in_sight
 from planners.cl_rrt.objective import cost_to_go
-from planners.cl_rrt.references import AIR_GATE, WATER_GATE
-from planners.cl_rrt.tree import OPEN
+from planners.cl_rrt.tree import OPEN, node_state
+from planners.stop_check import AIR_GATE, WATER_GATE
 
 DRAWS = 6  # uniform numbers a sample
 # How far afield samples are sought
@@ -30,6 +33,16 @@ _OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it b
 _WALL = 0.5  # m: samples keep this far from the walls
 
 
+class Sample(NamedTuple):
+    """What to grow toward."""
+
+    x: float  # m
+    y: float
+    z: float
+    air: bool  # whether it is reached from air
+    kind: int  # `GOAL_SAMPLE`, `COLUMN_SAMPLE`, `CAREFUL_SAMPLE` or `POINT_SAMPLE`
+
+
 @inlined
 def between(u, low, high):
     """Map a uniform number to an interval."""
@@ -37,14 +50,14 @@ def between(u, low, high):
 
 
 @inlined
-def draw_point(draws, k, root, goal, air, model):
+def draw_point(p, draws, k, air):
     """Sample a point of one medium outside the zone, mostly around root and goal (Alg. 1, line 1)."""
-    w = model.world
+    w, root, goal = p.check.world, node_state(p, 0), p.check.goal
     near = draws[k + 2] < _AROUND_SHARE
-    x_low = max(w.x_min + _WALL, min(root.state[0], goal[0]) - _AROUND) if near else w.x_min + _WALL
-    x_high = min(w.x_max - _WALL, max(root.state[0], goal[0]) + _AROUND) if near else w.x_max - _WALL
-    y_low = max(w.y_min + _WALL, min(root.state[1], goal[1]) - _AROUND) if near else w.y_min + _WALL
-    y_high = min(w.y_max - _WALL, max(root.state[1], goal[1]) + _AROUND) if near else w.y_max - _WALL
+    x_low = max(w.x_min + _WALL, min(root.x, goal.x) - _AROUND) if near else w.x_min + _WALL
+    x_high = min(w.x_max - _WALL, max(root.x, goal.x) + _AROUND) if near else w.x_max - _WALL
+    y_low = max(w.y_min + _WALL, min(root.y, goal.y) - _AROUND) if near else w.y_min + _WALL
+    y_high = min(w.y_max - _WALL, max(root.y, goal.y) + _AROUND) if near else w.y_max - _WALL
     x = between(draws[k + 3], x_low, x_high)
     y = between(draws[k + 4], y_low, y_high)
     z = between(draws[k + 5], AIR_GATE, w.z_max - _WALL) if air else between(draws[k + 5], w.z_min + _WALL, -WATER_GATE)
@@ -52,50 +65,52 @@ def draw_point(draws, k, root, goal, air, model):
 
 
 @inlined
-def draw_near(draws, k, root):
+def draw_near(p, draws, k):
     """Sample a point around the root, in its medium: for the way out of a narrow place."""
-    x = root.state[0] + between(draws[k + 3], -_NEAR, _NEAR)
-    y = root.state[1] + between(draws[k + 4], -_NEAR, _NEAR)
-    z = root.state[2] + between(draws[k + 5], -_NEAR, _NEAR)
-    return x, y, max(z, AIR_GATE) if root.state[2] > 0.0 else min(z, -WATER_GATE)
+    root = node_state(p, 0)
+    x = root.x + between(draws[k + 3], -_NEAR, _NEAR)
+    y = root.y + between(draws[k + 4], -_NEAR, _NEAR)
+    z = root.z + between(draws[k + 5], -_NEAR, _NEAR)
+    return x, y, max(z, AIR_GATE) if is_air(root.z) else min(z, -WATER_GATE)
 
 
 @inlined
-def draw_column(draws, k, root, goal, roam, settings, model):
+def draw_column(p, draws, k, roam):
     """Sample a crossing column near the water-side end; the point lies at the goal's height on the far side.
 
     Roaming, the columns lie around the root and the point just beyond the surface.
     """
-    w = model.world
-    from_air = root.state[2] > 0.0
+    w, root, goal = p.check.world, node_state(p, 0), p.check.goal
+    from_air = is_air(root.z)
     at_goal = from_air and roam != ANY_MEDIUM
-    cx = goal[0] if at_goal else root.state[0]
-    cy = goal[1] if at_goal else root.state[1]
+    cx = goal.x if at_goal else root.x
+    cy = goal.y if at_goal else root.y
     sine, cosine = sincos(between(draws[k + 3], -np.pi, np.pi))
-    radius = settings.column_radius * draws[k + 4]
+    radius = p.settings.column_radius * draws[k + 4]
     x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
     y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
     z = -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT
-    return x, y, z if roam == ANY_MEDIUM else goal[2]
+    return x, y, z if roam == ANY_MEDIUM else goal.z
 
 
 @inlined
-def next_node(work, size, x, y, z, to_goal, from_air, by_cost, stamp, objective):
-    """Return the best untried open node for a point, or -1: nearest, or least cost-to-come plus cost (sorted order)."""
+def next_node(p, size, sample, by_cost, stamp):
+    """Return the best untried open node for a sample, or -1: nearest, or least cost-to-come plus cost (sorted)."""
     best, least = -1, np.inf
-    rate = objective.rates.air if from_air else objective.rates.water
+    rate = p.objective.rates.air if sample.air else p.objective.rates.water
     for i in range(size):
-        n = work.nodes[i]
-        if n.dead or n.kind != OPEN or n.goal or work.path[i] == stamp:
+        n = p.nodes[i]
+        if n.dead or n.kind != OPEN or n.goal or p.path[i] == stamp:
             continue
-        if to_goal:
+        if sample.kind == GOAL_SAMPLE:
             if n.tried:
                 continue
             score = n.to_go + (n.cost if by_cost else 0.0)
         else:
-            if (n.state[2] > 0.0) != from_air:
+            s = node_state(p, i)
+            if is_air(s.z) != sample.air:
                 continue
-            dx, dy, dz = n.state[0] - x, n.state[1] - y, n.state[2] - z
+            dx, dy, dz = s.x - sample.x, s.y - sample.y, s.z - sample.z
             score = np.sqrt(dx * dx + dy * dy + dz * dz) / rate + (n.cost if by_cost else 0.0)
         if score < least:
             best, least = i, score
@@ -103,102 +118,93 @@ def next_node(work, size, x, y, z, to_goal, from_air, by_cost, stamp, objective)
 
 
 @inlined
-def least_cost(work, size):
+def least_cost(p, size):
     """Return the least cost of a node at the goal, infinite if there is none."""
     least = np.inf
     for i in range(size):
-        if work.nodes[i].goal and not work.nodes[i].dead:
-            least = min(least, work.nodes[i].cost)
+        if p.nodes[i].goal and not p.nodes[i].dead:
+            least = min(least, p.nodes[i].cost)
     return least
 
 
 @inlined
-def any_beyond(work, size, goal):
+def any_beyond(p, size):
     """Whether the tree has an open node in the goal's medium."""
-    found = False
+    found, air = False, is_air(p.check.goal.z)
     for i in range(size):
-        n = work.nodes[i]
-        found = found or (n.kind == OPEN and not n.dead and (n.state[2] > 0.0) == (goal[2] > 0.0))
+        n = p.nodes[i]
+        found = found or (n.kind == OPEN and not n.dead and is_air(node_state(p, i).z) == air)
     return found
 
 
 @inlined
-def draw_sample(draws, k, root, goal, roam, onward, settings, objective, model):
-    """Draw what to grow toward (Alg. 1, line 1).
-
-    Returns (x, y, z, whether it is reached from air, kind), the kind `GOAL_SAMPLE`, `COLUMN_SAMPLE`, `CAREFUL_SAMPLE`
-    or `POINT_SAMPLE`. `onward`: the goal's medium is reached, the goal is not, so most samples go there.
-    """
-    paper = objective.paper > 0.0
-    from_air = root.state[2] > 0.0
-    change = roam == ANY_MEDIUM or from_air != (goal[2] > 0.0)
-    if draws[k] < settings.goal_bias:
-        return goal[0], goal[1], goal[2], goal[2] > 0.0, GOAL_SAMPLE
+def draw_sample(p, draws, k, roam, onward):
+    """Draw a `Sample` (Alg. 1, line 1). `onward`: the goal's medium is reached, the goal is not, so most go there."""
+    goal, root_air = p.check.goal, is_air(node_state(p, 0).z)
+    goal_air, paper = is_air(goal.z), p.objective.paper > 0.0
+    change = roam == ANY_MEDIUM or root_air != goal_air
+    if draws[k] < p.settings.goal_bias:
+        return Sample(goal.x, goal.y, goal.z, goal_air, GOAL_SAMPLE)
     columns = change and (roam == ANY_MEDIUM or not paper) and not (onward and draws[k + 2] < 0.5)
-    if columns and draws[k] < settings.goal_bias + settings.column_bias:
-        x, y, z = draw_column(draws, k, root, goal, roam, settings, model)
-        return x, y, z, not z > 0.0, COLUMN_SAMPLE
+    if columns and draws[k] < p.settings.goal_bias + p.settings.column_bias:
+        x, y, z = draw_column(p, draws, k, roam)
+        return Sample(x, y, z, not is_air(z), COLUMN_SAMPLE)
     if roam != STRAIGHT_ON and draws[k + 2] < 0.5:
-        x, y, z = draw_near(draws, k, root)
-        return x, y, z, from_air, CAREFUL_SAMPLE
-    air = draws[k + 1] * 2.0 % 1.0 < 0.5 if change and not onward else goal[2] > 0.0
-    x, y, z = draw_point(draws, k, root, goal, air, model)
+        x, y, z = draw_near(p, draws, k)
+        return Sample(x, y, z, root_air, CAREFUL_SAMPLE)
+    # whether this draw lies below a half also tells how nodes are sorted, but for the paper's rule, which never sorts
+    coin = draws[k + 1] if paper else draws[k + 1] * 2.0 % 1.0
+    air = coin < 0.5 if change and not onward else goal_air
+    x, y, z = draw_point(p, draws, k, air)
     # as printed, a sample in the other medium is reached through the surface where the line meets it
-    return x, y, z, from_air if paper else air, POINT_SAMPLE
+    return Sample(x, y, z, root_air if paper else air, POINT_SAMPLE)
+
+
+@inlined
+def worth_trying(p, i, sample, best):
+    """Whether an extension of node i toward a sample could beat the best path, and is not seen to be blocked."""
+    s, o = node_state(p, i), p.objective
+    via = cost_to_go(s.x, s.y, s.z, sample.x, sample.y, sample.z, o) + left_to_go(p, sample)
+    if p.settings.prune > 0.0 and p.nodes[i].cost + _OPTIMISM * via >= best:
+        return False
+    seek = sample.kind <= COLUMN_SAMPLE and not o.paper > 0.0
+    return not seek or in_sight(p, i, sample)
 
 
 @routine
-def expand_tree(work, values, goal, size, draws, iterations, settings, objective, margin, roam, ticks):
+def expand_tree(p, size, draws, iterations, roam):
     """Expand the tree by a number of samples (Alg. 1); return its new size.
 
     Args:
-        work: `Workspace`.
-        values: packed `Model`.
-        goal: (3,) m.
+        p: `Planner`.
         size: nodes in use.
         draws: (iterations * DRAWS,) uniform numbers.
         iterations: samples.
-        settings: `SettingParams`.
-        objective: `ObjectiveParams`.
-        margin: clearance in m that edges keep.
         roam: `STRAIGHT_ON`, `CAREFUL` or `ANY_MEDIUM`, the more the longer the vehicle has waited for a path.
-        ticks: ticks a period.
     """
-    model = unpack_model(values)
-    root = work.nodes[0]
-    for i in range(work.path.size):
-        work.path[i] = -1
-    paper = objective.paper > 0.0
-    best = least_cost(work, size)
-    beyond = any_beyond(work, size, goal)
+    for i in range(p.path.size):
+        p.path[i] = -1
+    goal_air, paper = is_air(p.check.goal.z), p.objective.paper > 0.0
+    best, beyond = least_cost(p, size), any_beyond(p, size)
     for iteration in range(iterations):
         k = iteration * DRAWS
-        onward = beyond and best == np.inf and not paper
-        x, y, z, from_air, kind = draw_sample(draws, k, root, goal, roam, onward, settings, objective, model)
-        to_goal = kind == GOAL_SAMPLE
+        sample = draw_sample(p, draws, k, roam, beyond and best == np.inf and not paper)
         by_cost = draws[k + 1] < 0.5 and not paper
-        step = _CAREFUL_SHARE * settings.step if kind == CAREFUL_SAMPLE else settings.step
-        left = cost_to_go(x, y, z, goal[0], goal[1], goal[2], objective)
-        for _ in range(settings.tries):
-            i = next_node(work, size, x, y, z, to_goal, from_air, by_cost, iteration, objective)
+        step = _CAREFUL_SHARE * p.settings.step if sample.kind == CAREFUL_SAMPLE else p.settings.step
+        limit = _GOAL_EXTENSION if sample.kind == GOAL_SAMPLE else int(p.settings.extension)
+        for _ in range(int(p.settings.tries)):
+            i = next_node(p, size, sample, by_cost, iteration)
             if i < 0:
                 break
-            work.path[i] = iteration
-            n = work.nodes[i]
-            n.tried = 1 if to_goal else n.tried
-            # a sample that cannot beat the best path, even in an empty world, is not worth an edge
-            via = cost_to_go(n.state[0], n.state[1], n.state[2], x, y, z, objective) + left
-            if settings.prune > 0.0 and n.cost + _OPTIMISM * via >= best:
+            p.path[i] = iteration
+            p.nodes[i].tried = 1 if sample.kind == GOAL_SAMPLE else p.nodes[i].tried
+            if not worth_trying(p, i, sample, best):
                 continue
-            seek = kind <= COLUMN_SAMPLE and not paper
-            if seek and not in_sight(work, n, x, y, z, model.vehicle.radius, margin):
-                continue
-            limit = _GOAL_EXTENSION if to_goal else settings.extension
-            grown = extend(work, values, goal, i, size, x, y, z, limit, step, objective, margin, ticks)
+            grown = extend(p, i, size, sample, limit, step)
             if grown > size:
                 size = grown
-                end = work.nodes[size - 1]
+                end = p.nodes[size - 1]
                 best = min(best, end.cost) if end.goal else best
-                beyond = beyond or (end.state[2] > 0.0) == (goal[2] > 0.0)
+                beyond = beyond or is_air(node_state(p, size - 1).z) == goal_air
                 break
     return size

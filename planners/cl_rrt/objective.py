@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydrone_gym._jit import inlined
-from hydrone_gym.control.envelope import envelope_of
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.simulation.time_to_go import SETTLE_SHARE, CruiseSpeeds, cruise_speeds, time_to_go
 
 OBJECTIVES = ("time", "energy", "length", "paper")
@@ -26,11 +25,10 @@ class ObjectiveParams(NamedTuple):
     speeds: CruiseSpeeds  # m/s
 
 
-def objective_params(simulation: Simulation, objective: str) -> ObjectiveParams:
+def objective_params(envelope: Envelope, objective: str) -> ObjectiveParams:
     """Flatten an objective for a vehicle; raises ValueError for an unknown one."""
     if objective not in OBJECTIVES:
         raise ValueError(f"objective must be one of {', '.join(map(repr, OBJECTIVES))}, got {objective!r}")
-    envelope = envelope_of(simulation.vehicle)
     speeds = cruise_speeds(envelope)
     if objective == "time":
         return ObjectiveParams(1.0, 0.0, 0.0, 0.0, speeds, speeds)

@@ -5,6 +5,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from planners.stop_check import MARGIN
+
 _SWITCHES = ("replay", "verify")
 
 
@@ -16,9 +18,8 @@ class SettingParams(NamedTuple):
     column_radius: float
     margin: float
     rest_margin: float
-    tries: int
-    extension: int
-    look_ahead: int
+    tries: float
+    extension: float
     replay: float  # 1: paths are propagated again before their first edge is sent
     verify: float  # 1: an edge is sent only if it was seen to be followed by a stop
     step: float  # m an edge in air may move its reference: the safe speed times the period
@@ -37,7 +38,6 @@ class CLRRTSettings:
         rest_margin: clearance that the verified stop keeps, m.
         tries: nodes tried in sorted order for one sample.
         extension: longest extension toward one sample, edges.
-        look_ahead: periods that a stop is simulated for.
         max_nodes: size of the tree.
         replay: whether the path chosen is propagated again against what is known now; False only to see what it is for.
         verify: whether an edge must be seen to be followed by a stop; False only to see what it is for.
@@ -50,10 +50,9 @@ class CLRRTSettings:
     column_bias: float = 0.35
     column_radius: float = 5.0
     margin: float = 0.12
-    rest_margin: float = 0.03
+    rest_margin: float = MARGIN
     tries: int = 3
     extension: int = 12
-    look_ahead: int = 9
     max_nodes: int = 2000
     replay: bool = True
     verify: bool = True
@@ -73,7 +72,7 @@ class CLRRTSettings:
                 "CLRRTSettings.goal_bias + column_bias must not exceed 1, "
                 f"got {self.goal_bias!r} + {self.column_bias!r}"
             )
-        for name, least in (("tries", 1), ("extension", 1), ("look_ahead", 8), ("max_nodes", 100)):
+        for name, least in (("tries", 1), ("extension", 1), ("max_nodes", 100)):
             value = getattr(self, name)
             if not isinstance(value, int) or value < least:
                 raise ValueError(f"CLRRTSettings.{name} must be a whole number of at least {least}, got {value!r}")

@@ -7,10 +7,9 @@ less the vehicle's radius. The distances are measured on the vehicle itself, not
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 
-AHEAD_AIR = 0.2  # s: a hover is anchored this far ahead of the vehicle along its velocity
-AHEAD_WATER = 0.1  # s
 _DEPTH = 2.5  # m from the surface, clear of the transition zone
 _STOP = 5.0  # s
 _SPARE = 0.1  # m kept between the end of a stop and the edge of sensed space
@@ -19,7 +18,8 @@ _SPARE = 0.1  # m kept between the end of a stop and the edge of sensed space
 def stop_distances(simulation: Simulation, speeds: NDArray[np.float64], *, air: bool) -> NDArray[np.float64]:
     """Measure how far (m) the safety action lets the vehicle run on from forward speeds (m/s) in one medium."""
     reached = np.zeros(len(speeds))
-    ahead = AHEAD_AIR if air else AHEAD_WATER
+    envelope = envelope_of(simulation.vehicle, simulation.law)
+    ahead = envelope.ahead_air if air else envelope.ahead_water
     for k, speed in enumerate(speeds):
         state = np.zeros(12)
         state[2] = _DEPTH if air else -_DEPTH
@@ -38,8 +38,7 @@ def safe_speed(simulation: Simulation, periods_ahead: int) -> float:
         simulation: vehicle, world and period.
         periods_ahead: periods between sensing and the end of the edge decided on: 1, or 2 with planning latency.
     """
-    limit = simulation.vehicle.air_gains.speed_limit
-    speeds = np.linspace(0.1, 1.0, 10) * limit
+    speeds = np.linspace(0.1, 1.0, 10) * envelope_of(simulation.vehicle, simulation.law).cruise
     room = simulation.world.sensor_range - simulation.vehicle.radius - _SPARE
     needed = speeds * simulation.period * periods_ahead + stop_distances(simulation, speeds, air=True)
     fitting = speeds[needed <= room]

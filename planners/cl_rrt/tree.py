@@ -1,12 +1,16 @@
 """The tree: plain arrays of nodes with parent indices, a parent always before its children."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined
-from hydrone_gym.simulation.block import CROSSING_FIELDS, LOGGED_CROSSINGS, new_block
+from hydrone_gym._memory import fields_of, pointer
+from hydrone_gym.simulation.rollout import Rollout
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import VESSEL, Flown
+from planners.stop_check import Check, state_of
 
 # What a node is part of
 OPEN = 0  # ordinary: may be extended, can stop here
@@ -15,8 +19,7 @@ CROSSING = 2  # inside a crossing: the only way to stop is to finish it
 
 NODE = np.dtype(
     [
-        ("state", np.float64, (12,)),
-        ("integral", np.float64, (4,)),
+        *fields_of(Flown),  # with the reference a vessel
         ("reference", np.float64, (4,)),
         ("time", np.float64),  # since the root, s
         ("cost", np.float64),  # cost-to-come, in units of the objective
@@ -30,22 +33,40 @@ NODE = np.dtype(
         ("tried", np.int64),  # the goal was tried from here
     ]
 )
+_NODE_SIZE = NODE.itemsize // 8
+BACKUP = 64  # references; a crossing in full takes about 35
 
 
 class Workspace(NamedTuple):
     """Arrays a planning cycle works in. `nodes` has one spare slot at the end for scratch edges."""
 
     nodes: np.ndarray  # (capacity + 1,) dtype NODE
-    block: np.ndarray  # one lane
-    log: NDArray[np.float64]
-    closest: NDArray[np.float64]  # (obstacles,)
-    obstacles: NDArray[np.float64]  # (4 * obstacles,) flat
     path: NDArray[np.int64]  # (capacity + 1,)
-    edges: NDArray[np.int64]  # (1,) edges propagated so far
     backup: NDArray[np.float64]  # (BACKUP, 4) verified references that end in a stop
+    rollout: Any  # `Rollout.memory`, with the known obstacles
+    scratch: NDArray[np.float64]  # two vessels
+    edges: NDArray[np.float64]  # (1,) edges propagated so far
+
+    @classmethod
+    def around(
+        cls, nodes: np.ndarray, backup: NDArray[np.float64], simulation: Simulation, obstacles: NDArray[np.float64]
+    ) -> Self:
+        """Gather the arrays of one planning cycle around a tree and a backup, which it changes."""
+        path, rollout = np.zeros(len(nodes), np.int64), Rollout(simulation, obstacles)
+        return cls(nodes, path, backup, rollout.memory, np.zeros(2 * VESSEL), np.zeros(1))
 
 
-BACKUP = 64  # references; a crossing in full takes about 35
+class Planner(NamedTuple):
+    """What all parts of a planning cycle work with, made in its kernel."""
+
+    nodes: Any
+    path: Any
+    backup: Any
+    edges: Any
+    check: Check  # of stops; holds rollout, goal, world and envelope
+    settings: Any  # view of `SettingParams`
+    objective: Any  # view of `ObjectiveParams`
+    margin: float  # clearance in m that edges keep
 
 
 def new_nodes(capacity: int) -> np.ndarray:
@@ -53,33 +74,26 @@ def new_nodes(capacity: int) -> np.ndarray:
     return np.zeros(capacity + 1, NODE)
 
 
-def new_workspace(nodes: np.ndarray, obstacles: NDArray[np.float64], backup: NDArray[np.float64]) -> Workspace:
-    """Gather the arrays of one planning cycle around a tree."""
-    log = np.zeros((1, LOGGED_CROSSINGS, len(CROSSING_FIELDS)))
-    closest = np.zeros(len(obstacles))
-    path = np.zeros(len(nodes), np.int64)
-    return Workspace(nodes, new_block(1), log, closest, obstacles.reshape(-1), path, np.zeros(1, np.int64), backup)
+@inlined
+def node_state(p, i):
+    """Look at the `State` of node i."""
+    return state_of(pointer(p.nodes[i]))
 
 
 @inlined
 def copy_node(nodes, source, target):
-    """Copy one node, field by field (record assignment compiles slowly)."""
-    a, b = nodes[source], nodes[target]
-    for c in range(12):
-        b.state[c] = a.state[c]
-    for c in range(4):
-        b.integral[c] = a.integral[c]
-        b.reference[c] = a.reference[c]
-    b.time, b.cost, b.to_go, b.parent, b.next = a.time, a.cost, a.to_go, a.parent, a.next
-    b.kind, b.dead, b.unsafe, b.goal, b.tried = a.kind, a.dead, a.unsafe, a.goal, a.tried
+    """Copy one node, number by number (record assignment compiles slowly)."""
+    a, b = pointer(nodes[source]), pointer(nodes[target])
+    for k in range(_NODE_SIZE):
+        b[k] = a[k]
 
 
 @inlined
-def prune_orphans(nodes, size):
+def prune_orphans(p, size):
     """Mark every node dead whose parent is dead; one pass, as parents come first."""
     for i in range(1, size):
-        if nodes[nodes[i].parent].dead:
-            nodes[i].dead = 1
+        if p.nodes[p.nodes[i].parent].dead:
+            p.nodes[i].dead = 1
 
 
 @inlined

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from hydrone_gym.simulation.model import pack_model
+from hydrone_gym.control.laws import named_law
+from hydrone_gym.simulation.storage import pack_model
 from hydrone_gym.world.world import World
 from tests.simulation.closed_loop import _control
 
@@ -15,5 +16,14 @@ def rotor_speeds(vehicle, state, reference, *, velocity=(0.0, 0.0, 0.0), vertica
     """Return rotor speeds (rpm) and the new memory for a reference (x, y, z, psi) that moves at a velocity."""
     memory, out = np.array(integral, dtype=np.float64), np.empty(4)
     moving = np.array([*reference, *velocity], dtype=np.float64)
-    _control(pack_model(vehicle, World()), state, memory, moving, vertical, bool(state[2] > 0.0), 0.01, out)
+    _control(
+        pack_model(vehicle, World(), named_law("paper")),
+        state,
+        memory,
+        moving,
+        vertical,
+        bool(state[2] > 0.0),
+        0.01,
+        out,
+    )
     return out, memory

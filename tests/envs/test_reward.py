@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, World
-from hydrone_gym.control.envelope import envelope_of
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import pack_task
-from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import cruise_speeds
 from planners.cl_rrt.objective import objective_params
 from tests.envs.missions import AIR_TO_AIR, IDS, begin, fly_to, make, wander
@@ -63,4 +62,4 @@ def test_time_and_slow():
 def test_reward_and_planners_share_one_time_to_go(vehicle):
     speeds = pack_task(vehicle, World(), 120.0)[3:]
     np.testing.assert_array_equal(speeds, cruise_speeds(envelope_of(vehicle)))
-    np.testing.assert_array_equal(speeds, objective_params(Simulation(vehicle, World()), "time").rates)
+    np.testing.assert_array_equal(speeds, objective_params(envelope_of(vehicle), "time").rates)

@@ -314,7 +314,7 @@ def test_view_of_a_tree():
         ({"time_budget": float("nan")}, r"time_budget must be positive \(s\), got nan"),
         ({"objective": "speed"}, "objective must be one of 'time', 'energy', 'length', 'paper', got 'speed'"),
         ({"latency": 1}, "latency must be True or False, got 1"),
-        ({"seed": -3}, "seed must be a whole number that is not negative, got -3"),
+        ({"seed": -3}, "seed must be a whole number of at least 0, got -3"),
     ],
 )
 def test_bad_budget(options, message):

@@ -7,7 +7,7 @@ import pytest
 import hydrone_gym  # noqa: F401
 from hydrone_gym import Outcome, Scenario
 from planners import StraightLine
-from planners.policy import simulation_of
+from planners.belief import belief_of
 from planners.shield import CANDIDATES, HELD, Shield
 
 IDS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
@@ -55,9 +55,9 @@ def test_a_wild_policy_is_kept_safe(env_id, reach):
 
 def test_the_straight_line_arrives_more_often_behind_it():
     rows = gym.make_vec(IDS[1], num_envs=1, vectorization_mode="vector_entry_point")
-    bare = StraightLine(simulation_of(rows))
+    bare = StraightLine(belief_of(rows))
     alone = first_outcomes(bare, IDS[1], 60, 40)[0]
-    shielded = first_outcomes(Shield(bare, simulation_of(rows)), IDS[1], 60, 40)[0]
+    shielded = first_outcomes(Shield(bare, belief_of(rows)), IDS[1], 60, 40)[0]
     assert (alone == Outcome.COLLISION).sum() > 10
     assert not np.isin(shielded, BAD).any()
     assert (shielded == Outcome.GOAL).sum() > (alone == Outcome.GOAL).sum() + 10

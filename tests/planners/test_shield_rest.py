@@ -6,7 +6,7 @@ import pytest
 
 import hydrone_gym  # noqa: F401
 from hydrone_gym import Outcome
-from hydrone_gym.simulation.rows import new_rows
+from hydrone_gym.simulation.storage import new_rows
 from planners.shield import HELD, RETREAT, Shield
 
 NOWHERE = np.array([0.0, 0.0, -4.0, 0.5])  # a sphere far from where these tests fly

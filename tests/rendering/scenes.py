@@ -3,9 +3,9 @@
 import numpy as np
 
 from hydrone_gym import HYDRONE, Outcome, World
+from hydrone_gym.rendering.camera import View
 from hydrone_gym.rendering.frame import Painter
-from hydrone_gym.rendering.moment import Moment
-from hydrone_gym.rendering.view import View
+from hydrone_gym.rendering.track import Moment
 
 SIZE = (320, 240)
 WORLD = World()

@@ -9,10 +9,13 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
+from hydrone_gym import Scenario, World
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.figures import crossing_points, dash, plot_path, plot_tree, save_figure, split_media
+from hydrone_gym.rendering.figures import plot_path, plot_tree, save_figure
 from hydrone_gym.rendering.histories import plot_attitude, plot_position
+from hydrone_gym.rendering.paths import crossing_points, dash, split_media
 from hydrone_gym.rendering.scene3d import Scene
+from planners import TreeView
 
 NOTHING = np.zeros((0, 4))
 LEGEND = 0.12  # share of the height that the legend takes at the bottom
@@ -78,15 +81,15 @@ def test_near_hides_far():
     scene = Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0), azimuth=-60.0)
     eye = scene.camera[2]
     far, near = np.array([0.0, 0.0, 4.0]) - 3.0 * eye, np.array([0.0, 0.0, 4.0]) + 3.0 * eye
-    scene.spheres(np.array([[*near, 1.5]]), ("#00ff00", "#00ff00"))
-    scene.spheres(np.array([[*far, 1.0]]), ("#ff00ff", "#ff00ff"))
+    scene.obstacles(np.array([[*near, 1.5]]), ("#00ff00", "#00ff00"))
+    scene.obstacles(np.array([[*far, 1.0]]), ("#ff00ff", "#ff00ff"))
     scene.lines([np.array([far + 1.5 * eye, far - eye])], "#0000ff", 3.0)
     image = pixels(scene.figure)
     assert count(image, "#00ff00") > 3000
     assert count(image, "#ff00ff") == 0
     assert count(image, "#0000ff") == 0
     sunk = Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0), azimuth=-60.0)
-    sunk.spheres(np.array([[0.0, 0.0, -2.0, 1.0]]), ("#00ff00", "#00ff00"))
+    sunk.obstacles(np.array([[0.0, 0.0, -2.0, 1.0]]), ("#00ff00", "#00ff00"))
     image = pixels(sunk.figure)
     tinted = 0.7 * np.array(to_rgb("#00ff00")) + 0.3 * np.array(to_rgb(style.WATER))
     assert count(image, "#00ff00") == 0
@@ -95,7 +98,7 @@ def test_near_hides_far():
 
 def test_scales_are_equal_on_all_axes():
     scene = Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0))
-    scene.spheres(np.array([[0.0, 0.0, 5.0, 2.0]]), ("#00ff00", "#00ff00"))
+    scene.obstacles(np.array([[0.0, 0.0, 5.0, 2.0]]), ("#00ff00", "#00ff00"))
     image = pixels(scene.figure)
     rows, columns = np.nonzero(np.abs(image - to_rgb("#00ff00")).max(axis=-1) < 0.02)
     assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=3)
@@ -136,25 +139,22 @@ def test_tree_has_red_branches_in_air_and_purple_ones_under_water():
     begin = rng.uniform([-9, -9, 1], [9, 9, 9], size=(60, 3))
     air = np.stack((begin, begin + [0.5, 0.5, 0.5]), axis=1)
     water = air * [1.0, 1.0, -0.45]
-    edges, medium = np.concatenate((air, water)), np.arange(120) < 60
-    start, goal = (-9.0, -9.0, 8.0), (9.0, 9.0, -3.0)
-    both = pixels(plot_tree(edges, medium, start, goal, NOTHING))
-    dry = pixels(plot_tree(air, medium[:60], start, goal, NOTHING))
-    wet = pixels(plot_tree(water, medium[60:], start, goal, NOTHING))
+    edges, medium, none = np.concatenate((air, water)), np.arange(120) < 60, np.zeros(0, int)
+    scenario = Scenario(start=(-9.0, -9.0, 8.0, 0.0), goal=(9.0, 9.0, -3.0), obstacles=NOTHING)
+
+    def drawn(edges, air, path=none, scenario=scenario):
+        return pixels(plot_tree(TreeView(edges, air, np.zeros(len(edges)), path), scenario, World()))
+
+    both, dry, wet = drawn(edges, medium), drawn(air, medium[:60]), drawn(water, medium[60:])
     assert count(both, style.RED) > 300
     assert count(dry, style.RED) > 300
     assert count(wet, style.RED) == 0
     assert count(both, style.PURPLE) > count(dry, style.PURPLE) + 50
-    path = np.array([start, (9.0, 9.0, 1.0), goal])
-    known = pixels(plot_tree(edges, medium, start, goal, np.array([[0.0, 0.0, 5.0, 1.0]]), solution=path))
+    path = np.array([((-9.0, -9.0, 8.0), (9.0, 9.0, 1.0)), ((9.0, 9.0, 1.0), (9.0, 9.0, -3.0))])
+    world = Scenario(start=scenario.start, goal=scenario.goal, obstacles=[(0.0, 0.0, 5.0, 1.0)])
+    known = drawn(np.concatenate((edges, path)), np.append(medium, [True, False]), np.array([120, 121]), world)
     assert count(known, style.BLACK) > count(both, style.BLACK) + 500
     assert count(known, style.DETECTED[0]) > 500
-
-
-@pytest.mark.parametrize("shape", [(4, 3), (4, 1, 3), (4, 2, 2)])
-def test_tree_refuses_other_shapes(shape):
-    with pytest.raises(ValueError, match=r"edges must be \(E, K, 3\) with K >= 2 and in_air \(E,\)"):
-        plot_tree(np.zeros(shape), np.zeros(4, bool), (0, 0, 5), (0, 0, -3), NOTHING)
 
 
 def test_equal_flights_give_equal_files(dive, tmp_path):

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym import HYDRONE, Outcome
 from hydrone_gym.rendering import raycast
-from hydrone_gym.rendering.caption import describe
 from tests.rendering.scenes import SIZE, colour_at, moment, paint, painter, towards_eye
 
 
@@ -155,17 +154,16 @@ def test_looking_only_in_the_tiles_of_an_outline_misses_nothing(camera, monkeypa
     image = paint(shown, camera)
     everywhere = np.array([0, 0, -(-SIZE[0] // raycast.TILE), -(-SIZE[1] // raycast.TILE)])
     monkeypatch.setattr(
-        "hydrone_gym.rendering.canvas.outlines", lambda pose, ends, *_: np.tile(everywhere, (len(ends), 1))
+        "hydrone_gym.rendering.raycast.outlines", lambda pose, ends, *_: np.tile(everywhere, (len(ends), 1))
     )
     np.testing.assert_array_equal(paint(shown, camera), image)
 
 
 def test_words():
-    assert describe(12.34, 5.0, 0.8, Outcome.RUNNING)[0] == "12.3 s   in the air"
-    assert describe(12.34, -0.3, 0.8, Outcome.RUNNING)[0] == "12.3 s   crossing"
-    assert describe(12.34, -2.0, 0.8, Outcome.RUNNING)[0] == "12.3 s   under water"
-    texts = {describe(1.0, 1.0, 0.8, outcome)[0] for outcome in Outcome}
-    assert len(texts) == len(Outcome)
+    heights = {5.0: "in the air", -0.3: "crossing", -2.0: "under water"}
+    for z, word in heights.items():
+        assert moment((0.0, -6.0, z))._replace(time=12.34).words(0.8) == ("12.3 s", word)
+    assert len({moment()._replace(outcome=outcome).words(0.8) for outcome in Outcome}) == len(Outcome)
     running, ended = moment(), moment()._replace(outcome=Outcome.GOAL)
     changed = np.nonzero((paint(running) != paint(ended)).any(axis=2))
     assert changed[0].min() > 200

@@ -5,7 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from hydrone_gym.rendering.meshes import Mesh, ball, rod, slab, vehicle, walls
+from hydrone_gym.rendering.shapes import MODEL
+from hydrone_gym.rendering.stage import Mesh, ball, model, rod, slab, walls
 
 
 def volume(mesh):
@@ -34,11 +35,11 @@ def test_walls_floor_and_top_enclose_the_box():
 
 
 def test_the_vehicle_points_ahead_and_its_rotors_are_alike():
-    parts = vehicle(0.4)
-    assert parts.front.vertices[:, 0].max() == pytest.approx(0.4 * 1.62, rel=0.01)
-    assert np.abs(parts.front.vertices[:, 1]).max() == pytest.approx(0.4 * 0.62, rel=0.01)
-    lowest = [np.round(part.vertices[:, 0].min(), 3) for part in parts]
-    assert min(lowest) == lowest[2] == pytest.approx(-0.4 * 1.62, rel=0.01)
-    assert all(volume(part) > 0.0 for part in parts)
-    used = Counter(parts.frame.faces.ravel().tolist())
-    assert set(used) == set(range(len(parts.frame.vertices)))
+    parts = {name: model(shapes, 0.4) for name, shapes in MODEL.items()}
+    assert parts["front"].vertices[:, 0].max() == pytest.approx(0.4 * 1.62, rel=0.01)
+    assert np.abs(parts["front"].vertices[:, 1]).max() == pytest.approx(0.4 * 0.62, rel=0.01)
+    lowest = {name: part.vertices[:, 0].min() for name, part in parts.items()}
+    assert min(lowest.values()) == lowest["rotors"] == pytest.approx(-0.4 * 1.62, rel=0.01)
+    assert all(volume(part) > 0.0 for part in parts.values())
+    used = Counter(parts["frame"].faces.ravel().tolist())
+    assert set(used) == set(range(len(parts["frame"].vertices)))

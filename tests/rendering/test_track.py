@@ -4,8 +4,7 @@ import numpy as np
 
 from hydrone_gym import Outcome
 from hydrone_gym.evaluation import fly
-from hydrone_gym.rendering.moment import replay
-from hydrone_gym.rendering.video import moment_of
+from hydrone_gym.rendering.track import moment_of, moments
 from planners import StraightLine
 from tests.envs.missions import DIVE, SPHERE_BETWEEN, begin, wander
 
@@ -43,23 +42,23 @@ def test_a_copy_goes_on_by_itself():
     assert len(env._screen.track(0).ticks(env.simulation)) > length
 
 
-def test_replay_knows_only_what_was_known():
+def test_earlier_moments_know_only_what_was_known():
     env, _ = begin(SPHERE_BETWEEN)
     flight = fly(env, StraightLine.for_env(env), scenario=SPHERE_BETWEEN)
     assert flight.outcome is Outcome.COLLISION
     last = moment_of(flight)
-    moments = list(replay(last, range(1, len(last.ticks) + 1), 1.0))
-    assert moments[-1] is last
-    assert [len(moment.ticks) for moment in moments] == list(range(1, len(last.ticks) + 1))
-    np.testing.assert_allclose([moment.time for moment in moments], flight.trace.times, atol=1e-9)
-    assert {moment.outcome for moment in moments[:-1]} == {Outcome.RUNNING}
+    shown = list(moments(last, range(1, len(last.ticks) + 1), 1.0))
+    assert shown[-1] is last
+    assert [len(moment.ticks) for moment in shown] == list(range(1, len(last.ticks) + 1))
+    np.testing.assert_allclose([moment.time for moment in shown], flight.trace.times, atol=1e-9)
+    assert {moment.outcome for moment in shown[:-1]} == {Outcome.RUNNING}
     near = np.linalg.norm(last.ticks[:, :3] - last.obstacles[0, :3], axis=1) - last.obstacles[0, 3] <= 1.001
     assert not near[0]
-    assert [bool(moment.detected[0]) for moment in moments] == np.maximum.accumulate(near).tolist()
+    assert [bool(moment.detected[0]) for moment in shown] == np.maximum.accumulate(near).tolist()
 
 
 def test_what_was_known_from_the_start_stays_known():
     env, _ = begin(SPHERE_BETWEEN)
     last = moment_of(fly(env, StraightLine.for_env(env), scenario=SPHERE_BETWEEN))
     far = last._replace(obstacles=last.obstacles + [0.0, 9.0, 0.0, 0.0])
-    assert all(moment.detected[0] for moment in replay(far, range(1, 5), 1.0))
+    assert all(moment.detected[0] for moment in moments(far, range(1, 5), 1.0))

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hydrone_gym.simulation.rows import new_rows
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import new_rows
 
 
 def random_rows(rng, count, world, *, spread=1.0):

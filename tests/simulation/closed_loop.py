@@ -15,10 +15,12 @@ from scipy.optimize import brentq
 
 from hydrone_gym._jit import kernel
 from hydrone_gym.control.law import control
-from hydrone_gym.control.reference import Integral, Reference
+from hydrone_gym.control.laws import named_law
+from hydrone_gym.control.paper import PaperGains
+from hydrone_gym.control.reference import Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
-from hydrone_gym.physics.kinematics import State, attitude_of
-from hydrone_gym.simulation.model import pack_model, unpack_model
+from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
+from hydrone_gym.simulation.storage import model_of, pack_model
 from tests.physics import oracle
 
 DT = 0.01
@@ -45,12 +47,15 @@ exact_derivative = _compile_oracle()
 
 @kernel
 def _control(values, state, integral, reference, vertical, air, dt, speeds):
-    model = unpack_model(values)
+    model = model_of(values, PaperGains)
     s = State(*to_fixed_tuple(state, 12))
     memory = Integral(*to_fixed_tuple(integral, 4))
     wanted = Reference(*to_fixed_tuple(reference, 7))
     medium = medium_at(model.vehicle, air)
-    out, new = control(s, attitude_of(s), memory, wanted, vertical, model, medium, air, dt)
+    attitude = attitude_of(s)
+    rates = euler_rates(attitude, s.p, s.q, s.r)
+    now = Instant(s, attitude, rates, wanted, vertical, air, medium)
+    out, new = control(now, memory, model, dt)
     for i in range(4):
         speeds[i] = out[i]
         integral[i] = new[i]
@@ -58,7 +63,7 @@ def _control(values, state, integral, reference, vertical, air, dt, speeds):
 
 @kernel
 def _step(values, state, speeds, air, dt):
-    model = unpack_model(values)
+    model = model_of(values, PaperGains)
     s = State(*to_fixed_tuple(state, 12))
     new = step(s, attitude_of(s), to_fixed_tuple(speeds, 4), model.vehicle, medium_at(model.vehicle, air), air, dt)
     for i, value in enumerate(new):
@@ -74,7 +79,7 @@ class ClosedLoop:
 
     def __init__(self, vehicle, world, period, start, reference):
         self.vehicle, self.world, self.period = vehicle, world, period
-        self.values = pack_model(vehicle, world)
+        self.values = pack_model(vehicle, world, named_law("paper"))
         self.media = (oracle.medium(vehicle, water=False), oracle.medium(vehicle, water=True))
         self.state = np.array(start, dtype=np.float64)
         self.reference = np.array(reference, dtype=np.float64)

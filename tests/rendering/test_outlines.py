@@ -1,11 +1,13 @@
-"""Outlines of spheres against points sampled on them."""
+"""Outlines of obstacles against points sampled on them."""
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
-from hydrone_gym.rendering.spheres import camera_axes, convex_hull, sphere_outlines
+from hydrone_gym.rendering.camera import axes
+from hydrone_gym.rendering.scene3d import outlines
 
-CAMERA = camera_axes(20.0, -60.0)
+CAMERA = axes(-60.0, 20.0)
 
 
 def area(polygon):
@@ -16,17 +18,12 @@ def area(polygon):
 def test_camera_axes_are_orthonormal_and_right_handed():
     np.testing.assert_allclose(CAMERA @ CAMERA.T, np.eye(3), atol=1e-15)
     np.testing.assert_allclose(np.cross(CAMERA[0], CAMERA[1]), CAMERA[2], atol=1e-15)
-    np.testing.assert_allclose(camera_axes(90.0, -90.0), np.eye(3), atol=1e-15)  # a map: x right, y up
-
-
-def test_convex_hull_of_a_square_drops_what_lies_inside():
-    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.5, 0.0]], dtype=float)
-    assert convex_hull(points).tolist() == [[0, 0], [1, 0], [1, 1], [0, 1]]
+    np.testing.assert_allclose(axes(-90.0, 90.0), np.eye(3), atol=1e-15)  # a map: x right, y up
 
 
 def test_outline_is_a_circle_and_caps_lie_inside():
     centre = np.array([1.0, 2.0, 5.0])
-    outline, *caps = sphere_outlines(centre, 1.5, CAMERA, True)
+    outline, *caps = outlines(np.append(centre, 1.5), CAMERA, True)
     seen = (outline - centre) @ CAMERA[:2].T
     np.testing.assert_allclose(np.linalg.norm(seen, axis=1), 1.5, atol=1e-6)
     assert area(outline) == pytest.approx(np.pi * 1.5**2, rel=0.01)
@@ -43,12 +40,10 @@ def test_what_rises_above_the_water_is_exact(height):
     points = rng.normal(size=(40000, 3))
     points = centre + points / np.linalg.norm(points, axis=1, keepdims=True)
     dry = points[points[:, 2] >= 0.0]
-    hull = convex_hull(dry @ CAMERA[:2].T)
-    x, y = hull.T
-    sampled = 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-    assert area(sphere_outlines(centre, 1.0, CAMERA, True)[0]) == pytest.approx(sampled, rel=0.02)
+    sampled = ConvexHull(dry @ CAMERA[:2].T).volume
+    assert area(outlines(np.append(centre, 1.0), CAMERA, True)[0]) == pytest.approx(sampled, rel=0.02)
 
 
 def test_nothing_of_a_sunken_sphere_rises_above_the_water():
-    assert sphere_outlines(np.array([0.0, 0.0, -3.0]), 1.0, CAMERA, True) == []
-    assert len(sphere_outlines(np.array([0.0, 0.0, -3.0]), 1.0, CAMERA, False)) > 1
+    assert outlines(np.array([0.0, 0.0, -3.0, 1.0]), CAMERA, True) == []
+    assert len(outlines(np.array([0.0, 0.0, -3.0, 1.0]), CAMERA, False)) > 1

@@ -1,0 +1,165 @@
+"""Rollouts: vehicles flown from a state with references against known obstacles, one at a time or many.
+
+A rollout owns the lane, the obstacles as they lie in memory and the distances; whoever predicts, plans or checks holds
+vehicles and references and sees nothing of that. `Rollout` flies one vehicle, from Python with `fly` and from kernels
+with `propagate`; `fly_many` is its sister for many at once.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym._jit import inlined, kernel, routine
+from hydrone_gym._memory import call, gather, pointer, scatter
+from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.outcome import RUNNING
+from hydrone_gym.simulation.rows import Engine, advance_rows, set_move
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import (
+    AT,
+    CROSSINGS,
+    ENERGY,
+    GOAL,
+    LANES,
+    LOG,
+    LOG_ENTRY,
+    LOGGED_CROSSINGS,
+    REFERENCE,
+    VESSEL,
+    CrossingEntry,
+    Episode,
+    Point,
+    Pose,
+    new_rows,
+)
+
+
+class Result(NamedTuple):
+    """How one period went; the end of the flight is where the rollout was told to write it."""
+
+    outcome: float  # an `Outcome`
+    clearance: float  # least to a known obstacle, m
+    crossings: float  # of the surface
+    lateral_speed: float  # greatest at a crossing, m/s; 0 without one
+    cos_tilt: float  # least at a crossing; 1 without one
+    seconds: float  # flown
+    energy: float  # of the rotors' shafts, J
+
+
+class Lane(NamedTuple):
+    """A rollout as kernels hold it, all of it pointers and numbers; see `lane_of`."""
+
+    address: int
+    ticks: int
+    values: Any  # packed `Model`
+    block: Any
+    obstacles: Any  # flat: x, y, z, r in m
+    closest: Any
+    number: int  # of obstacles
+
+
+class Rollout:
+    """One vehicle, flown a period at a time.
+
+    Args:
+        simulation: of one lane: vehicle, world, law and period.
+        obstacles: (M, 4) spheres x, y, z, r in m, those that are known.
+    """
+
+    def __init__(self, simulation: Simulation, obstacles: NDArray[np.float64]) -> None:
+        """Lay out the obstacles."""
+        self._engine = simulation.engine
+        self._obstacles = np.array(obstacles, np.float64).reshape(-1)
+        self._closest = np.zeros(len(obstacles))
+
+    @property
+    def memory(self) -> tuple[Engine, NDArray[np.float64], NDArray[np.float64]]:
+        """What kernels take; `lane_of` makes a `Lane` of it."""
+        return self._engine, self._obstacles, self._closest
+
+    def fly(self, row: np.ndarray, reference: NDArray[np.float64]) -> Result:
+        """Fly a row (1,) of dtype `ROW` for one period toward a reference (4,), in place; m, m, m, rad.
+
+        State, memory and reference move on; what its episode collects stays as it is.
+        """
+        return Result(*_fly(self.memory, row, np.asarray(reference, np.float64)))
+
+
+@inlined
+def lane_of(memory):
+    """Make a `Lane` of a rollout's memory."""
+    engine, obstacles, closest = memory
+    return Lane(
+        engine.address,
+        engine.ticks,
+        pointer(engine.values),
+        pointer(engine.block),
+        pointer(obstacles),
+        pointer(closest),
+        closest.size,
+    )
+
+
+@routine
+def propagate(lane, start, end, goal, reference):
+    """Fly a vehicle for one period toward a reference and write where it ends; returns a `Result`.
+
+    Args:
+        lane: `Lane`.
+        start: pointer to a vessel: its `Flown`, then its reference in force; the energy counts from zero.
+        end: pointer to a vessel, written; may be `start`.
+        goal: pointer to the goal, m.
+        reference: (x, y, z, psi), m and rad.
+    """
+    b = lane.block
+    for k in range(VESSEL):
+        b[k] = start[k]
+    b[ENERGY] = 0.0
+    scatter(b, GOAL, 0, 1, gather(goal, 0, 0, 1, Point))
+    scatter(b, AT.episode, 0, 1, Episode(0.0, np.inf, np.float64(RUNNING), 0.0))
+    new = Pose(reference[0], reference[1], reference[2], reference[3])
+    set_move(b, 0, 1, new)
+    call(lane.address, b, lane.obstacles, lane.closest, lane.values, lane.number, 0, lane.ticks, lane.ticks)
+    for k in range(REFERENCE):
+        end[k] = b[k]
+    scatter(end, REFERENCE, 0, 1, new)
+    episode, speed, cosine = gather(b, AT.episode, 0, 1, Episode), 0.0, 1.0
+    for slot in range(int(min(b[CROSSINGS], LOGGED_CROSSINGS))):
+        entry = gather(b, LOG + slot * LOG_ENTRY, 0, 1, CrossingEntry)
+        speed, cosine = max(speed, entry.lateral_speed), min(cosine, entry.cos_tilt)
+    return Result(episode.outcome, episode.clearance, episode.crossings, speed, cosine, episode.ticks * TICK, b[ENERGY])
+
+
+@kernel
+def _fly(memory, row, reference):
+    vessel = pointer(row[0])
+    goal = pointer(row[0].goal)
+    return propagate(lane_of(memory), vessel, vessel, goal, (reference[0], reference[1], reference[2], reference[3]))
+
+
+class Flock:
+    """Many copies of one vehicle, flown side by side against the same known obstacles.
+
+    Args:
+        simulation: of `LANES` lanes.
+        row: (1,) dtype `ROW`, what each of them begins with.
+        count: how many.
+        obstacles: (M, 4) spheres x, y, z, r in m.
+    """
+
+    def __init__(self, simulation: Simulation, row: np.ndarray, count: int, obstacles: NDArray[np.float64]) -> None:
+        """Lay out rows and obstacles."""
+        self.rows = np.repeat(row, count)
+        self._engine, self._count = simulation.engine, len(obstacles)
+        blocks = -(-count // LANES)
+        self._obstacles = np.tile(np.repeat(obstacles.reshape(-1), LANES), (blocks, 1))
+        self._closest = np.full((blocks, self._count * LANES), np.inf)
+
+    def fly(self, references: NDArray[np.float64]) -> None:
+        """Fly all of them for one period, each toward its reference of (count, 4); m and rad."""
+        ticks = self._engine.ticks
+        advance_rows(self._engine, self.rows, references, self._obstacles, self._closest, self._count, 0, ticks)
+
+
+__all__ = ["Flock", "Lane", "Result", "Rollout", "lane_of", "new_rows", "propagate"]
