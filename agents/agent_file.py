@@ -27,21 +27,13 @@ _LARGEST = 50_000_000  # bytes of tensors: a policy network is far smaller
 
 @dataclass(frozen=True, kw_only=True)
 class AgentFile:
-    """What an agent's files hold.
+    """What an agent's files hold."""
 
-    Attributes:
-        name: of the agent.
-        algorithm: that trained it.
-        environment: id it was trained on, with the version.
-        network: egocentric observation (68,) to relative action (3,).
-        notes: further plain data about its training: steps, seed, versions.
-    """
-
-    name: str
-    algorithm: str
-    environment: str
-    network: Network
-    notes: dict[str, Any] = field(default_factory=dict)
+    name: str  # of the agent
+    algorithm: str  # that trained it
+    environment: str  # id it was trained on, with the version
+    network: Network  # egocentric observation (68,) to relative action (3,)
+    notes: dict[str, Any] = field(default_factory=dict)  # further plain data about its training: steps, seed, versions
 
 
 def observation_fingerprint() -> str:
@@ -80,15 +72,13 @@ def read_agent(folder: Path) -> AgentFile:
     Raises FileNotFoundError if there is none, ValueError naming the file for one that is foreign, damaged, of another
     format version, or trained for an environment or an observation that this package does not have.
     """
-    import yaml
-
     text = folder if folder.suffix in (".yaml", ".yml") else folder / TEXT
     if not text.is_file():
         raise FileNotFoundError(f"no agent at {folder}: {text} does not exist")
+    content = read_yaml(text)
     try:
-        content = _checked(yaml.safe_load(text.read_text(encoding="utf-8")))
-        network = _network(content, text.parent)
-    except (ValueError, yaml.YAMLError) as error:
+        network = _network(_checked(content), text.parent)
+    except ValueError as error:
         raise ValueError(f"{text}: {error}") from None
     return AgentFile(
         name=str(content["name"]),
@@ -97,6 +87,16 @@ def read_agent(folder: Path) -> AgentFile:
         network=network,
         notes=content.get("notes") or {},
     )
+
+
+def read_yaml(file: Path) -> Any:
+    """Return plain data from a YAML file, nothing else; ValueError in one line, naming the file."""
+    import yaml
+
+    try:
+        return yaml.safe_load(file.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file}: no YAML: {' '.join(str(error).split())}") from None
 
 
 def _checked(content: Any) -> dict[str, Any]:

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
-
-from agents.replay import load_replay, save_replay
 
 KEPT = 2  # latest checkpoints of a run; one if they hold a replay buffer, which is large
 MODEL = "model.zip"
 _REST = "rest.pkl"
-_REPLAY = "replay.npz"
+_BUFFER = "replay.npz"
+_PLAIN = ("observations", "actions", "rewards", "dones", "timeouts")  # what is written of a buffer as it is
 
 
 def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -> Path:
@@ -35,7 +35,7 @@ def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -
     unfinished.mkdir(parents=True)
     model.save(unfinished / MODEL)
     if isinstance(model, OffPolicyAlgorithm):
-        save_replay(model.replay_buffer, unfinished / _REPLAY)
+        save_buffer(model.replay_buffer, unfinished / _BUFFER)
     rest = {
         "environment": model.env,
         "actions": model.action_space.np_random.bit_generator.state,
@@ -47,7 +47,7 @@ def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -
     with (unfinished / _REST).open("wb") as stream:
         pickle.dump(rest, stream)
     os.replace(unfinished, final)
-    kept = 1 if (final / _REPLAY).exists() else KEPT
+    kept = 1 if (final / _BUFFER).exists() else KEPT
     for old in checkpoints(folder)[:-kept]:
         shutil.rmtree(old)
     return final
@@ -67,9 +67,39 @@ def load_checkpoint(path: Path, algorithm: type[BaseAlgorithm]) -> tuple[BaseAlg
     changes = {"replay_buffer_class": None} if issubclass(algorithm, OffPolicyAlgorithm) else {}
     model = algorithm.load(path / MODEL, env=rest["environment"], device="cpu", force_reset=False, **changes)
     if isinstance(model, OffPolicyAlgorithm):
-        load_replay(model.replay_buffer, path / _REPLAY)
+        load_buffer(model.replay_buffer, path / _BUFFER)
     model.action_space.np_random.bit_generator.state = rest["actions"]
     torch.set_rng_state(rest["torch"])
     np.random.set_state(rest["numpy"])  # noqa: NPY002
     random.setstate(rest["python"])
     return model, rest["extra"]
+
+
+def save_buffer(buffer: ReplayBuffer, path: Path) -> None:
+    """Write a replay buffer of flat observations to an NPZ file, only what it holds, and every observation once.
+
+    The observation after a transition is nearly always the one before the next transition of the same row. Only the
+    others, those that end an episode and the newest, are written beside them: half the size.
+    """
+    held = buffer.buffer_size if buffer.full else buffer.pos
+    after = buffer.next_observations[:held]
+    other = (after != _following(buffer.observations[:held])).any(axis=-1)
+    arrays = {name: getattr(buffer, name)[:held] for name in _PLAIN}
+    np.savez(path, allow_pickle=False, pos=buffer.pos, full=buffer.full, other=other, after=after[other], **arrays)
+
+
+def load_buffer(buffer: ReplayBuffer, path: Path) -> None:
+    """Fill a new buffer of the same shape with what `save_buffer` wrote."""
+    with np.load(path, allow_pickle=False) as saved:
+        held = len(saved["rewards"])
+        for name in _PLAIN:
+            getattr(buffer, name)[:held] = saved[name]
+        after = buffer.next_observations[:held]
+        after[:] = _following(buffer.observations[:held])
+        after[saved["other"]] = saved["after"]
+        buffer.pos, buffer.full = int(saved["pos"]), bool(saved["full"])
+
+
+def _following(observations: np.ndarray) -> np.ndarray:
+    """Return what each row observed one period later; the buffer is a ring in time."""
+    return np.roll(observations, -1, axis=0)

@@ -7,24 +7,24 @@ lead where nobody has flown, is that of this module too.
 """
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from stable_baselines3.common.torch_layers import create_mlp
 from tqdm import tqdm
 
 from agents.agent import ACTIONS
 from agents.agent_file import TEXT, AgentFile, save_agent
+from agents.algorithms import network_of
 from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Demonstration, Demonstrations
 from agents.evaluation import MISSIONS
-from agents.network import Network
 from hydrone_gym.evaluation import provenance
+from hydrone_gym.evaluation.suites import MISSIONS
 from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric
 from hydrone_gym.perception.relative import STEP
 from hydrone_gym.simulation.outcome import Outcome
@@ -38,40 +38,30 @@ _LEVEL = 1e-6  # m: a shorter horizontal way from start to goal gives no directi
 class Cloning:
     """What is learnt from, how, and where the agent goes.
 
-    Attributes:
-        data: folder of one dataset or of several, flown with the same options.
-        out: the agent's folder, made if missing; must not hold one.
-        seed: of the weights and of the order of the pairs.
-        hidden: outputs of each hidden layer.
-        epochs: times that every pair is learnt from.
-        batch: pairs a step.
-        learning_rate: of Adam at the beginning.
-        held_back: share of the flights that are not learnt from, to measure the error on.
-        progress: show a bar on stderr.
-
     Raises:
         ValueError: a number out of range.
     """
 
-    data: Path
-    out: Path
-    seed: int = 0
-    hidden: tuple[int, ...] = (128, 128)
-    epochs: int = 400
-    batch: int = 512
-    learning_rate: float = 1e-3
-    held_back: float = 0.1
-    progress: bool = False
+    data: Path  # folder of one dataset or of several, flown with the same options
+    out: Path  # the agent's folder, made if missing; must not hold one
+    seed: int = 0  # of the weights and of the order of the pairs
+    hidden: tuple[int, ...] = (128, 128)  # outputs of each hidden layer
+    epochs: int = 400  # times that every pair is learnt from
+    batch: int = 512  # pairs a step
+    learning_rate: float = 1e-3  # of Adam at the beginning
+    held_back: float = 0.1  # share of the flights that are not learnt from, to measure the error on
+    progress: bool = False  # show a bar on stderr
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for name in ("epochs", "batch"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if not 0.0 < self.learning_rate < float("inf"):
-            raise ValueError(f"learning_rate must be positive and finite, got {self.learning_rate}")
-        if not 0.0 <= self.held_back < 1.0:
-            raise ValueError(f"held_back must lie in [0, 1), got {self.held_back}")
+        for name, fits, rule in (
+            ("epochs", self.epochs >= 1, "be at least 1"),
+            ("batch", self.batch >= 1, "be at least 1"),
+            ("learning_rate", 0.0 < self.learning_rate < float("inf"), "be positive and finite"),
+            ("held_back", 0.0 <= self.held_back < 1.0, "lie in [0, 1)"),
+        ):
+            if not fits:
+                raise ValueError(f"{name} must {rule}, got {getattr(self, name)}")
 
 
 class Pairs(NamedTuple):
@@ -84,25 +74,15 @@ class Pairs(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Cloned:
-    """What came of it.
+    """What came of it."""
 
-    Attributes:
-        agent: as it was saved.
-        options: of the environments that were flown.
-        flights: successful ones, those learnt from and those held back.
-        pairs: learnt from.
-        clipped: share of all pairs whose reference lay beyond the reach of a relative action.
-        losses: (epochs,) mean squared error of the batches of each epoch.
-        held_back_loss: mean squared error on the flights held back; None if there are none.
-    """
-
-    agent: AgentFile
-    options: dict[str, Any]
-    flights: tuple[int, int]
-    pairs: int
-    clipped: float
-    losses: list[float] = field(repr=False)
-    held_back_loss: float | None
+    agent: AgentFile  # as it was saved
+    options: dict[str, Any]  # of the environments that were flown
+    flights: tuple[int, int]  # successful ones, those learnt from and those held back
+    pairs: int  # learnt from
+    clipped: float  # share of all pairs whose reference lay beyond the reach of a relative action
+    losses: list[float] = field(repr=False)  # (epochs,) mean squared error of the batches of each epoch
+    held_back_loss: float | None  # mean squared error on the flights held back; None if there are none
 
     def notes(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -137,23 +117,18 @@ def relative_actions(
 
 
 def pairs_of(flights: list[Demonstration], egocentric: Egocentric) -> Pairs:
-    """Return the pairs of flights, those of the periods in order.
-
-    Args:
-        flights: at least one.
-        egocentric: of the environment that was flown.
-    """
-    seen, wanted = [], []
+    """Return the pairs of flights, those of the periods in order; `egocentric` is of the environment that was flown."""
+    seen, wanted = [np.zeros((0, OBSERVATION_SIZE), np.float32)], [np.zeros((0, ACTIONS))]
     for flight in flights:
         raw, memory = flight.observations, None
         for k in range(len(flight.actions)):
             observation, memory = egocentric.observe({key: values[k] for key, values in raw.items()}, memory)
-            seen.append(observation)
+            seen.append(observation[None])
         states, goal = raw["state"][:-1], raw["goal"][0]
         wanted.append(relative_actions(flight.actions, states, states[0, :3], goal))
     actions = np.concatenate(wanted)
     clipped = int((np.abs(actions) > 1.0).any(axis=1).sum())
-    return Pairs(np.array(seen), np.clip(actions, -1.0, 1.0).astype(np.float32), clipped)
+    return Pairs(np.concatenate(seen), np.clip(actions, -1.0, 1.0).astype(np.float32), clipped)
 
 
 def clone(cloning: Cloning) -> Cloned:
@@ -170,40 +145,29 @@ def clone(cloning: Cloning) -> Cloned:
     options = datasets[0].options
     if any(dataset.options != options for dataset in datasets):
         raise ValueError(f"{cloning.data}: demonstrations must have been flown with the same options")
-    learnt, held_back = _split(datasets, cloning)
-    egocentric = Egocentric(datasets[0].make_env().get_wrapper_attr("simulation"))
-    pairs = pairs_of(learnt, egocentric)
-    layers, losses = fit(pairs, cloning)
-    clipped, count, loss = pairs.clipped, len(pairs.actions), None
-    if held_back:
-        kept = pairs_of(held_back, egocentric)
-        clipped, count = clipped + kept.clipped, count + len(kept.actions)
-        loss = float(np.mean((_network_of(layers)(kept.observations) - kept.actions) ** 2))
-    cloned = Cloned(
-        agent=_agent_of(layers, datasets, cloning),
-        options=options,
-        flights=(len(learnt), len(held_back)),
-        pairs=len(pairs.actions),
-        clipped=clipped / count,
-        losses=losses,
-        held_back_loss=loss,
-    )
-    save_agent(cloned.agent, cloning.out)
-    (cloning.out / REPORT).write_text(json.dumps(cloned.notes(), indent=1) + "\n", encoding="utf-8")
-    return cloned
-
-
-def _split(datasets: list[Demonstrations], cloning: Cloning) -> tuple[list[Demonstration], list[Demonstration]]:
-    """Return the successful flights to learn from, and those to hold back: the last of each dataset."""
-    learnt, held_back = [], []
+    learnt, held_back = list[Demonstration](), list[Demonstration]()
     for dataset in datasets:
         arrived = [flight for flight in dataset.flights if flight.outcome is Outcome.GOAL]
         first = len(arrived) - int(cloning.held_back * len(arrived))
-        learnt += arrived[:first]
-        held_back += arrived[first:]
+        learnt, held_back = learnt + arrived[:first], held_back + arrived[first:]
     if not learnt:
         raise ValueError(f"{cloning.data}: no flight arrived, there is nothing to learn from")
-    return learnt, held_back
+    egocentric = Egocentric(datasets[0].make_env().get_wrapper_attr("simulation"))
+    pairs, kept = pairs_of(learnt, egocentric), pairs_of(held_back, egocentric)
+    layers, losses = fit(pairs, cloning)
+    agent = _agent_of(layers, datasets, cloning)
+    cloned = Cloned(
+        agent=agent,
+        options=options,
+        flights=(len(learnt), len(held_back)),
+        pairs=len(pairs.actions),
+        clipped=(pairs.clipped + kept.clipped) / (len(pairs.actions) + len(kept.actions)),
+        losses=losses,
+        held_back_loss=float(np.mean((agent.network(kept.observations) - kept.actions) ** 2)) if held_back else None,
+    )
+    save_agent(agent, cloning.out)
+    (cloning.out / REPORT).write_text(json.dumps(cloned.notes(), indent=1) + "\n", encoding="utf-8")
+    return cloned
 
 
 def fit(pairs: Pairs, cloning: Cloning) -> tuple[torch.nn.Sequential, list[float]]:
@@ -211,7 +175,7 @@ def fit(pairs: Pairs, cloning: Cloning) -> tuple[torch.nn.Sequential, list[float
     torch.set_num_threads(1)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(cloning.seed)
-        layers = _layers(cloning.hidden)
+        layers = torch.nn.Sequential(*create_mlp(OBSERVATION_SIZE, ACTIONS, list(cloning.hidden)))
         inputs, outputs = torch.from_numpy(pairs.observations), torch.from_numpy(pairs.actions)
         steps = cloning.epochs * -(-len(inputs) // cloning.batch)
         adam = torch.optim.Adam(layers.parameters(), lr=cloning.learning_rate)
@@ -230,39 +194,14 @@ def fit(pairs: Pairs, cloning: Cloning) -> tuple[torch.nn.Sequential, list[float
     return layers, losses
 
 
-def _layers(hidden: tuple[int, ...]) -> torch.nn.Sequential:
-    """Return a multilayer perceptron, observation to action, with new weights."""
-    sizes = (OBSERVATION_SIZE, *hidden)
-    layers: list[torch.nn.Module] = []
-    for inputs, outputs in pairwise(sizes):
-        layers += [torch.nn.Linear(inputs, outputs), torch.nn.ReLU()]
-    return torch.nn.Sequential(*layers, torch.nn.Linear(sizes[-1], ACTIONS))
-
-
-def _arrays(layers: torch.nn.Sequential, name: str) -> Iterator[NDArray[np.float32]]:
-    for layer in layers:
-        if isinstance(layer, torch.nn.Linear):
-            yield np.ascontiguousarray(getattr(layer, name).detach().numpy().T)
-
-
-def _network_of(layers: torch.nn.Sequential) -> Network:
-    weights, biases = tuple(_arrays(layers, "weight")), tuple(_arrays(layers, "bias"))
-    return Network(weights=weights, biases=biases, activation="relu", output="linear")
-
-
 def _agent_of(layers: torch.nn.Sequential, datasets: list[Demonstrations], cloning: Cloning) -> AgentFile:
     """Return the agent with what it was learnt from."""
-    sources = [{"env_id": each.env_id, "policy": each.policy, "sha256": each.sha256} for each in datasets]
-    settings = {"seed": cloning.seed, "epochs": cloning.epochs, "batch": cloning.batch}
+    sources = [{key: getattr(each, key) for key in ("env_id", "policy", "sha256")} for each in datasets]
+    settings = {name: getattr(cloning, name) for name in ("seed", "epochs", "batch", "learning_rate")}
     return AgentFile(
         name=cloning.out.name,
         algorithm="behaviour cloning",
         environment=MISSIONS[0],
-        network=_network_of(layers),
-        notes={
-            **settings,
-            "learning_rate": cloning.learning_rate,
-            "demonstrations": sources,
-            "versions": provenance.versions(_PACKAGES),
-        },
+        network=network_of(list(layers)),
+        notes={**settings, "demonstrations": sources, "versions": provenance.versions(_PACKAGES)},
     )

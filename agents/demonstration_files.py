@@ -8,11 +8,10 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.envs.registration import registry
 from minari.dataset.minari_storage import MinariStorage
 
-from agents.demonstrations import DATA, FORMAT, INFOS, METADATA, OWN, SHA, Demonstration, Demonstrations, type_of_info
+from agents.demonstrations import DATA, FORMAT, INFOS, METADATA, OWN, SHA, Demonstration, Demonstrations
 
 _KEYS = ("env_id", "options", "policy", "versions")
 
@@ -70,34 +69,15 @@ def _read(data: Path) -> Demonstrations:
 
 
 def _flight(episode: dict[str, Any], seed: int, env: gym.Env) -> Demonstration:
-    """Check one flight against the spaces of its environment; ValueError says what does not fit."""
-    name, periods = f"episode {episode['id']}", len(episode["rewards"])
-    space, actions = env.observation_space, env.action_space
-    assert isinstance(space, spaces.Dict)
-    assert isinstance(actions, spaces.Box)
-    for key, box in space.items():
-        _check(
-            f"{name}: observations[{key!r}]",
-            episode["observations"].get(key),
-            (periods + 1, *(box.shape or ())),
-            box.dtype,
-        )
-    _check(f"{name}: actions", episode["actions"], (periods, *actions.shape), actions.dtype)
-    _check(f"{name}: rewards", episode["rewards"], (periods,), np.dtype(np.float64))
-    infos = episode["infos"] or {}
-    for key in INFOS:
-        _check(f"{name}: infos[{key!r}]", infos.get(key), (periods + 1,), np.dtype(type_of_info(key)))
-    for key in ("terminations", "truncations"):
-        _check(f"{name}: {key}", episode[key], (periods,), np.dtype(bool))
-    over = episode["terminations"] | episode["truncations"]
-    if periods == 0 or over.sum() != 1 or not over[-1]:
-        raise ValueError(f"{name}: it must end once, with its last period")
-    return Demonstration(seed=seed, **{key: value for key, value in episode.items() if key != "id"})
-
-
-def _check(name: str, array: Any, shape: tuple[int, ...], dtype: Any) -> None:
-    if not isinstance(array, np.ndarray) or array.shape != shape or array.dtype != dtype:
-        got = f"{array.shape} {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
-        raise ValueError(f"{name} must be {shape} {dtype}, got {got}")
-    if name.endswith(("actions", "rewards")) and not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite")
+    """Check one flight against the spaces of its environment; ValueError if it does not fit."""
+    name = f"episode {episode['id']}"
+    flight = Demonstration(seed=seed, **{key: value for key, value in episode.items() if key != "id"})
+    ends, first = flight.terminations | flight.truncations, {key: seen[0] for key, seen in flight.observations.items()}
+    lengths = {len(seen) - 1 for seen in (*flight.observations.values(), *(flight.infos[key] for key in INFOS))}
+    lengths |= {len(flight.actions), len(flight.rewards), len(ends)}
+    if len(lengths) > 1 or ends.sum() != 1 or not ends[-1]:
+        raise ValueError(f"{name}: its arrays must be equally long, and it must end once, with its last period")
+    fits = first in env.observation_space and all(action in env.action_space for action in flight.actions)
+    if not fits or not np.isfinite(flight.rewards).all():
+        raise ValueError(f"{name} does not fit the spaces of {env.spec and env.spec.id}")
+    return flight

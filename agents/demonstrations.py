@@ -1,34 +1,15 @@
 """Demonstrations: flights of any policy on training worlds, as datasets of Minari, a mission each.
 
-A root folder holds one Minari dataset a mission, `<root>/HydroneGym/<mission>-<policy>-v0/data/`, with two files.
-Minari finds it by the id `HydroneGym/<mission>-<policy>-v0` when `MINARI_DATASETS_PATH` names the root.
-
-`metadata.json`: Minari's keys, among them `env_spec` (id and options of the environment), and
-
-| key | content |
-|---|---|
-| `sha256` | of `main_data.hdf5`, checked when it is read |
-| `hydrone_gym` | `format` 1, `env_id`, `options`, `policy`, `origin` of the policy, `versions`, `commit` |
-
-`main_data.hdf5`: a group `episode_<k>` a flight of T periods, its attribute `seed` that of the world, and
-
-| dataset | shape, type |
-|---|---|
-| `observations/<key>` | (T + 1, ...) float64, raw, as `interface="world"` gives them, the first and the last included |
-| `actions` | (T, 4) float32 references in m, m, m, rad: those flown |
-| `rewards` | (T,) float64 |
-| `terminations`, `truncations` | (T,) bool, True at the end only |
-| `infos/outcome` | (T + 1,) int64, values of `Outcome` |
-| `infos/time`, `energy`, `clearance` | (T + 1,) float64: s, J, m |
-
-Nothing in them is code. The same seed, options and actions give the same observations again, bit for bit.
+docs/demonstrations.md has the format: `<root>/HydroneGym/<mission>-<policy>-v0/data/` with `metadata.json` and
+`main_data.hdf5`. Nothing in them is code. The same seed, options and actions give the same observations again, bit for
+bit.
 """
 
 import hashlib
 import json
 import re
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,16 +23,16 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import hydrone_gym
-from agents.evaluation import HELD_OUT, MISSIONS
 from hydrone_gym.evaluation import provenance
-from hydrone_gym.evaluation.policies import PolicySource, find_policy
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.flight import fly
+from hydrone_gym.evaluation.policies import Policy, PolicySource, find_policy
+from hydrone_gym.evaluation.suites import HELD_OUT, MISSIONS
 from hydrone_gym.simulation.outcome import Outcome
 
 FIRST_SEED = 6_000_000  # above the worlds that training draws, below those held out
 METADATA, DATA = "metadata.json", "main_data.hdf5"
 OWN, FORMAT, SHA = "hydrone_gym", 1, "sha256"
-INFOS = ("outcome", "time", "energy", "clearance")
+INFOS = {"outcome": np.int64, "time": np.float64, "energy": np.float64, "clearance": np.float64}  # as stored
 _PACKAGES = (*provenance.PACKAGES, "minari")
 
 
@@ -59,26 +40,17 @@ _PACKAGES = (*provenance.PACKAGES, "minari")
 class Recording:
     """What is flown and where it is written.
 
-    Attributes:
-        root: folder of the datasets, made if missing.
-        policy: what `hydrone_gym.evaluation.policies.find_policy` takes.
-        missions: environment ids, a dataset each.
-        flights: a mission, each in a world of its own.
-        seed: of the first world; flight k is in the world that the environment draws from ``seed + k``.
-        options: keyword options of the environments, plain data.
-        progress: show a bar on stderr.
-
     Raises:
         ValueError: no flights, seeds that are held out for evaluation, or an option that cannot be recorded.
     """
 
-    root: Path
-    policy: str = "clrrt"
-    missions: tuple[str, ...] = MISSIONS
-    flights: int = 400
-    seed: int = FIRST_SEED
-    options: dict[str, Any] = field(default_factory=dict)
-    progress: bool = False
+    root: Path  # folder of the datasets, made if missing
+    policy: str = "clrrt"  # what `hydrone_gym.evaluation.policies.find_policy` takes
+    missions: tuple[str, ...] = MISSIONS  # environment ids, a dataset each
+    flights: int = 400  # a mission, each in a world of its own
+    seed: int = FIRST_SEED  # of the first world; flight k is in the world that the environment draws from ``seed + k``
+    options: dict[str, Any] = field(default_factory=dict)  # keyword options of the environments, plain data
+    progress: bool = False  # show a bar on stderr
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -117,60 +89,54 @@ class Demonstration:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Demonstrations:
-    """A dataset: flights of one policy on one mission.
+    """A dataset: flights of one policy on one mission."""
 
-    Attributes:
-        env_id: of the environment.
-        options: its keyword options.
-        policy: what flew.
-        versions: of the packages it was recorded with.
-        sha256: of the data.
-        flights: in order of their seeds.
-    """
-
-    env_id: str
-    options: dict[str, Any]
-    policy: str
-    versions: dict[str, str]
-    sha256: str
-    flights: tuple[Demonstration, ...]
+    env_id: str  # of the environment
+    options: dict[str, Any]  # its keyword options
+    policy: str  # what flew
+    versions: dict[str, str]  # of the packages it was recorded with
+    sha256: str  # of the data
+    flights: tuple[Demonstration, ...]  # in order of their seeds
 
     def make_env(self) -> gym.Env:
         """Make the environment that was flown."""
         return gym.make(self.env_id, disable_env_checker=True, **self.options)
 
 
+class _Notebook(gym.Wrapper):
+    """Notes down an episode; actions are clipped and rounded as their space has them, then flown."""
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin anew."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self.seen, self.infos, self.steps = [observation], [info], list[tuple[Any, ...]]()
+        return observation, info
+
+    def step(self, action: Any) -> Any:
+        """Fly a period and note it down."""
+        box: Any = self.env.action_space
+        action = np.clip(np.asarray(action, np.float32), box.low, box.high)
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self.seen.append(observation)
+        self.infos.append(info)
+        self.steps.append((action, float(reward), terminated, truncated))
+        return observation, reward, terminated, truncated, info
+
+
 def demonstrate(env: gym.Env, policy: Policy, seed: int) -> Demonstration:
-    """Fly the world of a seed and record it; actions are clipped and rounded as their space has them, then flown."""
-    low, high = env.action_space.low, env.action_space.high  # type: ignore[attr-defined]
-    observation, info = env.reset(seed=seed)
-    observations, infos, actions, rewards = [observation], [info], [], []
-    memory, start = None, np.array([True])
-    ends: list[list[bool]] = []
-    while not ends or not any(ends[-1]):
-        action, memory = policy.predict(observation, state=memory, episode_start=start, deterministic=True)
-        actions.append(np.clip(np.asarray(action, np.float32), low, high))
-        observation, reward, *end, info = env.step(actions[-1])
-        observations.append(observation)
-        infos.append(info)
-        rewards.append(float(reward))
-        ends.append(end)
-        start = np.array([False])
-    terminations, truncations = np.array(ends, bool).T.copy()
+    """Fly the world of a seed and record it."""
+    notes = _Notebook(env)
+    fly(notes, policy, seed=seed)
+    actions, rewards, terminations, truncations = zip(*notes.steps, strict=True)
     return Demonstration(
         seed=seed,
-        observations={key: np.array([each[key] for each in observations]) for key in observation},
+        observations={key: np.array([each[key] for each in notes.seen]) for key in notes.seen[0]},
         actions=np.array(actions, np.float32),
         rewards=np.array(rewards),
-        terminations=terminations,
-        truncations=truncations,
-        infos={key: np.array([each[key] for each in infos], type_of_info(key)) for key in INFOS},
+        terminations=np.array(terminations, bool),
+        truncations=np.array(truncations, bool),
+        infos={key: np.array([each[key] for each in notes.infos], kind) for key, kind in INFOS.items()},
     )
-
-
-def type_of_info(info: str) -> type:
-    """Return how an info is stored."""
-    return np.int64 if info == "outcome" else np.float64
 
 
 def record(recording: Recording) -> list[Path]:
@@ -187,7 +153,10 @@ def record(recording: Recording) -> list[Path]:
             raise FileExistsError(f"{folder} exists already: name another --out, or remove it")
     for folder, env_id in missions.items():
         env = gym.make(env_id, disable_env_checker=True, **recording.options)
-        _check_space(env)
+        spaces: Any = env.observation_space
+        empty = [key for key, space in spaces.items() if 0 in space.shape]
+        if empty:
+            raise ValueError(f"Minari cannot describe empty arrays as in {', '.join(empty)}: fly at least 1 obstacle")
         partial = folder.with_name(f".{folder.name}.partial")
         shutil.rmtree(partial, ignore_errors=True)
         (partial / "data").mkdir(parents=True)
@@ -198,14 +167,6 @@ def record(recording: Recording) -> list[Path]:
             shutil.rmtree(partial, ignore_errors=True)
             env.close()
     return list(missions)
-
-
-def _check_space(env: gym.Env) -> None:
-    """Refuse an observation that Minari cannot describe: one without obstacles has an array without entries."""
-    assert isinstance(env.observation_space, gym.spaces.Dict)
-    empty = [key for key, space in env.observation_space.items() if 0 in (space.shape or ())]
-    if empty:
-        raise ValueError(f"Minari cannot describe empty arrays, and {', '.join(empty)} is one: fly at least 1 obstacle")
 
 
 def _dataset_id(env_id: str, label: str) -> str:
@@ -220,7 +181,8 @@ def _write(folder: Path, dataset_id: str, env: gym.Env, source: PolicySource, re
     storage = MinariStorage.new(folder, env.observation_space, env.action_space, env_spec=env.spec, data_format="hdf5")
     seeds: Iterable[int] = range(recording.seed, recording.seed + recording.flights)
     seeds = tqdm(seeds, desc=env.spec.id, unit="flight", disable=not recording.progress)
-    storage.update_episodes(_buffers(demonstrate(env, source.make(env, seed), seed) for seed in seeds))
+    flights = (demonstrate(env, source.make(env, seed), seed) for seed in seeds)
+    storage.update_episodes(EpisodeBuffer(**vars(flight)) for flight in flights)
     described = {
         "format": FORMAT,
         "env_id": env.spec.id,
@@ -241,8 +203,3 @@ def _write(folder: Path, dataset_id: str, env: gym.Env, source: PolicySource, re
             SHA: hashlib.sha256((folder / DATA).read_bytes()).hexdigest(),
         }
     )
-
-
-def _buffers(flights: Iterable[Demonstration]) -> Iterator[EpisodeBuffer]:
-    for flight in flights:
-        yield EpisodeBuffer(**vars(flight))

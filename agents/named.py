@@ -1,14 +1,14 @@
 """Shipped agents as factories with a name, and the reader of an agent's folder."""
 
+from functools import partial
 from typing import Any
 
-from agents.agent import Agent, load_agent
+from agents.agent import load_agent
 from planners.shield import Shield
 
-
-def ppo(env: Any) -> Agent:
-    """Return the agent trained without the shield, for an environment."""
-    return load_agent("ppo", env)
+ppo = partial(load_agent, "ppo")
+sac = partial(load_agent, "sac")
+from_folder = load_agent
 
 
 def ppo_shield(env: Any) -> Shield:
@@ -16,16 +16,6 @@ def ppo_shield(env: Any) -> Shield:
     return Shield.for_env(load_agent("ppo_shielded", env), env)
 
 
-def sac(env: Any) -> Agent:
-    """Return the agent that SAC trained without the shield, for an environment."""
-    return load_agent("sac", env)
-
-
 def sac_shield(env: Any) -> Shield:
-    """Return that agent behind the shield."""
-    return Shield.for_env(load_agent("sac", env), env)
-
-
-def from_folder(folder: str, env: Any) -> Agent:
-    """Return the agent that training wrote to a folder."""
-    return load_agent(folder, env)
+    """Return the agent that SAC trained without the shield, behind it."""
+    return Shield.for_env(sac(env), env)

@@ -30,20 +30,14 @@ def _dense(x: NDArray, weights: NDArray, bias: NDArray, out: NDArray) -> None:
 class Network:
     """Layers with an activation between them.
 
-    Attributes:
-        weights: (inputs, outputs) float32 of each layer.
-        biases: (outputs,) float32 of each layer.
-        activation: "tanh" or "relu", after every layer but the last.
-        output: "linear", or "tanh" for policies that squash.
-
     Raises:
         ValueError: layers that do not fit each other, numbers that are not finite, an unknown activation.
     """
 
-    weights: tuple[NDArray[np.float32], ...]
-    biases: tuple[NDArray[np.float32], ...]
-    activation: str
-    output: str
+    weights: tuple[NDArray[np.float32], ...]  # (inputs, outputs) float32 of each layer
+    biases: tuple[NDArray[np.float32], ...]  # (outputs,) float32 of each layer
+    activation: str  # "tanh" or "relu", after every layer but the last
+    output: str  # "linear", or "tanh" for policies that squash
 
     def __post_init__(self) -> None:
         """Check that the layers fit."""

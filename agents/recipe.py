@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.utils import LinearSchedule
 
 from agents.agent import ACTIONS
+from agents.agent_file import read_yaml
 
 FOLDER = Path(__file__).parent / "hyperparameters"
 ENV_ID = "HydroneGym/Mission-v0"
@@ -18,24 +18,15 @@ LINEAR = "lin_"  # prefix of a value that falls linearly to zero over the traini
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """How to train.
+    """How to train."""
 
-    Attributes:
-        algorithm: name of the file, "ppo".
-        steps: transitions to learn from.
-        missions: rows an environment id, in order.
-        policy: name of the policy class of Stable-Baselines3.
-        settings: the other arguments of the algorithm, as written in the file.
-        shield: whether the rows fly behind the shield.
-        environment: keyword options of the environments that the rows fly in, where the defaults are not meant.
-    """
-
-    algorithm: str
-    steps: int
-    missions: dict[str, int]
-    policy: str
-    settings: dict[str, Any]
-    shield: bool = False
+    algorithm: str  # name of the file, "ppo"
+    steps: int  # transitions to learn from
+    missions: dict[str, int]  # rows an environment id, in order
+    policy: str  # name of the policy class of Stable-Baselines3
+    settings: dict[str, Any]  # the other arguments of the algorithm, as written in the file
+    shield: bool = False  # whether the rows fly behind the shield
+    # keyword options of the environments that the rows fly in, where the defaults are not meant
     environment: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -61,10 +52,7 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     if algorithm not in known:
         raise ValueError(f"algorithm must be one of {', '.join(map(repr, known))}, got {algorithm!r}")
     file = FOLDER / f"{algorithm}.yml" if path is None else path
-    try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
-        raise ValueError(f"{file}: no YAML: {error}") from None
+    content = read_yaml(file)
     if not isinstance(content, dict) or not isinstance(content.get(ENV_ID), dict):
         raise ValueError(f"{file}: needs an entry {ENV_ID!r} with the hyper-parameters")
     settings = dict(content[ENV_ID])
@@ -72,16 +60,17 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     if missing:
         raise ValueError(f"{file}: {ENV_ID} lacks {', '.join(missing)}")
     count, steps, policy = settings.pop("n_envs"), settings.pop("n_timesteps"), settings.pop("policy")
-    if not isinstance(settings.get("policy_kwargs", {}), dict):
-        raise ValueError(f"{file}: policy_kwargs must be a mapping, code is not run: {settings['policy_kwargs']!r}")
-    if settings.get("noise_type") not in (None, "normal"):
-        raise ValueError(f"{file}: noise_type must be 'normal', got {settings['noise_type']!r}")
-    missions = content.get("missions", {ENV_ID: count})
-    if not isinstance(missions, dict) or sum(missions.values()) != count:
-        raise ValueError(f"{file}: the rows of missions must sum to n_envs = {count}, got {missions!r}")
-    environment = content.get("environment", {})
-    if not isinstance(environment, dict):
-        raise ValueError(f"{file}: environment must be a mapping of keyword options, got {environment!r}")
+    kwargs, noise = settings.get("policy_kwargs", {}), settings.get("noise_type")
+    missions, environment = content.get("missions", {ENV_ID: count}), content.get("environment", {})
+    rows = sum(missions.values()) if isinstance(missions, dict) else None
+    for fits, rule, got in (
+        (isinstance(kwargs, dict), "policy_kwargs must be a mapping, code is not run", kwargs),
+        (noise in (None, "normal"), "noise_type must be 'normal'", noise),
+        (rows == count, f"the rows of missions must sum to n_envs = {count}", missions),
+        (isinstance(environment, dict), "environment must be a mapping of keyword options", environment),
+    ):
+        if not fits:
+            raise ValueError(f"{file}: {rule}, got {got!r}")
     return Recipe(
         algorithm=algorithm,
         steps=int(steps),

@@ -35,7 +35,7 @@ class RunLog(BaseCallback):
     def __init__(
         self, folder: Path, total: int, *, every: int, progress: bool, spent: tuple[float, float] = (0.0, 0.0)
     ) -> None:
-        """Keep the options; files are opened when the training starts."""
+        """Keep the options."""
         super().__init__()
         self.folder = folder
         self._total, self._every, self._progress, self._spent = total, every, progress, spent
@@ -50,8 +50,6 @@ class RunLog(BaseCallback):
     def _on_training_start(self) -> None:
         self._began = (time.perf_counter(), time.process_time())
         self._cut_curve()
-        self._file = (self.folder / CURVE).open("a", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file)
         self._bar = tqdm(
             total=self._total, initial=self.num_timesteps, unit="step", unit_scale=True, disable=not self._progress
         )
@@ -96,8 +94,9 @@ class RunLog(BaseCallback):
     def _write_line(self) -> None:
         line = _summary(self._ended)
         wall, cpu = self._seconds()
-        self._writer.writerow([self.num_timesteps, f"{wall:.2f}", f"{cpu:.2f}", len(self._ended), *line])
-        self._file.flush()
+        with (self.folder / CURVE).open("a", newline="", encoding="utf-8") as stream:
+            cells = [self.num_timesteps, f"{wall:.2f}", f"{cpu:.2f}", len(self._ended), *line]
+            csv.writer(stream).writerow(cells)
         if self._ended:
             self._bar.set_postfix_str(f"success {100.0 * float(line[0]):.1f} %")
         self._ended, self._written_at = [], self.num_timesteps
@@ -107,7 +106,6 @@ class RunLog(BaseCallback):
             self._write_line()
         self.checkpoint()
         self._bar.close()
-        self._file.close()
 
 
 def _summary(ended: list[tuple[int, float, int]]) -> list[Any]:

@@ -15,18 +15,20 @@ import torch
 import yaml
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.agent_file import save_agent
-from agents.algorithms import ALGORITHMS
+from agents.agent_file import read_yaml, save_agent
+from agents.algorithms import ALGORITHMS, export_agent
 from agents.checkpoint import MODEL, checkpoints, load_checkpoint
-from agents.evaluation import HELD_OUT, Score, evaluate_missions
-from agents.export import export_agent
 from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, Recipe, load_recipe
 from agents.run_log import CHECKPOINTS, RunLog, draw_curve
 from hydrone_gym.evaluation.provenance import versions
+from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.run import evaluate_held_out
+from hydrone_gym.evaluation.suites import HELD_OUT
 
 CONFIG = "config.yaml"
 TENSORBOARD = "tensorboard"
+Flown = tuple[list[Record], list[dict[str, Any]]]  # of held-out worlds: records, and their scores
 PACKAGES = ("hydrone-gym", "stable_baselines3", "sb3_contrib", "torch", "gymnasium", "numpy", "numba")
 
 
@@ -34,37 +36,24 @@ PACKAGES = ("hydrone-gym", "stable_baselines3", "sb3_contrib", "torch", "gymnasi
 class TrainingRun:
     """What is trained, where, and from what.
 
-    Attributes:
-        folder: run folder, made by `train`; must not hold a run already.
-        algorithm: name of a recipe of the package.
-        seed: of everything random; one seed and one thread give the same weights again.
-        steps: transitions, the recipe's number unless given.
-        recipe: path of a YAML file to use instead of the package's.
-        options: keyword options of the environments, `num_obstacles` and so on, in training and evaluation; they go
-            before those of the recipe, which are for training alone.
-        start_from: run folder whose latest weights to begin with, None for new ones.
-        threads: of torch; with one, results repeat bit for bit.
-        checkpoint_every: least number of steps between checkpoints.
-        evaluation_episodes: held-out worlds a mission at the end, 0 for none.
-        progress: show a bar on stderr.
-        tensorboard: also write Stable-Baselines3's own log for TensorBoard.
-
     Raises:
         ValueError: an option out of range, or TensorBoard asked for and not installed.
     """
 
-    folder: Path
-    algorithm: str = "ppo"
-    seed: int = 0
-    steps: int | None = None
-    recipe: Path | None = None
+    folder: Path  # run folder, made by `train`; must not hold a run already
+    algorithm: str = "ppo"  # name of a recipe of the package
+    seed: int = 0  # of everything random; one seed and one thread give the same weights again
+    steps: int | None = None  # transitions, the recipe's number unless given
+    recipe: Path | None = None  # path of a YAML file to use instead of the package's
+    # keyword options of the environments, `num_obstacles` and so on, in training and evaluation; they go before those
+    # of the recipe, which are for training alone
     options: dict[str, Any] = field(default_factory=dict)
-    start_from: Path | None = None
-    threads: int = 1
-    checkpoint_every: int = 500_000
-    evaluation_episodes: int = 1000
-    progress: bool = True
-    tensorboard: bool = False
+    start_from: Path | None = None  # run folder whose latest weights to begin with, None for new ones
+    threads: int = 1  # of torch; with one, results repeat bit for bit
+    checkpoint_every: int = 500_000  # least number of steps between checkpoints
+    evaluation_episodes: int = 1000  # held-out worlds a mission at the end, 0 for none
+    progress: bool = True  # show a bar on stderr
+    tensorboard: bool = False  # also write Stable-Baselines3's own log for TensorBoard
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -84,8 +73,8 @@ class TrainingRun:
         return recipe if self.steps is None else dataclasses.replace(recipe, steps=self.steps)
 
 
-def train(run: TrainingRun) -> list[Score]:
-    """Train from the beginning and return the scores on held-out worlds.
+def train(run: TrainingRun) -> Flown:
+    """Train from the beginning and return how the agent flew in held-out worlds.
 
     Raises:
         FileExistsError: the folder holds a run already; go on with it by `resume`.
@@ -106,15 +95,15 @@ def train(run: TrainingRun) -> list[Score]:
     return _learn(run, recipe, model, (0.0, 0.0))
 
 
-def resume(folder: Path, *, progress: bool = True) -> list[Score]:
-    """Go on with a run from its latest checkpoint, as if it had not stopped, and return its scores.
+def resume(folder: Path, *, progress: bool = True) -> Flown:
+    """Go on with a run from its latest checkpoint, as if it had not stopped, and return what `train` does.
 
     Raises:
         FileNotFoundError: no run, or one without a checkpoint.
     """
     if not (folder / CONFIG).is_file():
         raise FileNotFoundError(f"no training run at {folder}: {folder / CONFIG} does not exist")
-    content = yaml.safe_load((folder / CONFIG).read_text(encoding="utf-8"))
+    content = read_yaml(folder / CONFIG)
     recipe = Recipe(**content["recipe"])
     paths = {name: content["run"][name] and Path(content["run"][name]) for name in ("recipe", "start_from")}
     run = TrainingRun(**{**content["run"], **paths, "folder": folder, "progress": progress})
@@ -137,7 +126,7 @@ def _latest(folder: Path) -> Path:
     return saved[-1]
 
 
-def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[float, float]) -> list[Score]:
+def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[float, float]) -> Flown:
     """Train to the end, then write the curve's figure, the agent and its evaluation."""
     log = RunLog(run.folder, recipe.steps, every=run.checkpoint_every, progress=run.progress, spent=spent)
     model.tensorboard_log = str(run.folder / TENSORBOARD) if run.tensorboard else None
@@ -149,12 +138,12 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
     folder, episodes = run.folder / "agent", run.evaluation_episodes
     notes = {"steps": model.num_timesteps, "seed": run.seed, "versions": versions(PACKAGES)}
     save_agent(export_agent(model, run.folder.name, ENV_ID, notes), folder)
-    scores = []
+    flown: Flown = ([], [])
     if episodes > 0:
-        scores = evaluate_missions(folder, shield=recipe.shield, episodes=episodes, options=run.options)
-    text = json.dumps([dataclasses.asdict(score) for score in scores], indent=1)
-    (run.folder / "evaluation.json").write_text(text + "\n", encoding="utf-8")
-    return scores
+        policy = f"{folder}+shield" if recipe.shield else str(folder)
+        flown = evaluate_held_out(policy, worlds=episodes, options=run.options)
+    (run.folder / "evaluation.json").write_text(json.dumps(flown[1], indent=1) + "\n", encoding="utf-8")
+    return flown
 
 
 def _write_config(run: TrainingRun, recipe: Recipe) -> None:

@@ -4,8 +4,8 @@
     python -m benchmarks.generalisation --episodes 200 --policies ppo ppo-shield --shapes "60 spheres" --out /tmp/trial
     python -m benchmarks.results                            # tables and figure from what was measured
 
-Every flight is one of `agents.evaluation.fly_worlds`. All policies fly the same worlds, from seeds that neither the
-training nor the choice of the shipped agents has seen.
+Every flight is one of `hydrone_gym.evaluation.fly_worlds`. All policies fly the same worlds, from seeds that neither
+the training nor the choice of the shipped agents has seen.
 """
 
 import shlex
@@ -17,16 +17,16 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import tyro
 from rich.console import Console
 
-from agents.evaluation import fly_worlds, score_of
 from benchmarks.generalisation_table import success_sheet
 from benchmarks.timing import RESULTS, save
 from benchmarks.world_shapes import SHAPED, SHAPES
+from hydrone_gym.evaluation import fly_worlds
 from hydrone_gym.evaluation.policies import PolicySource, find_policies
-from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.evaluation.records import record_of
+from hydrone_gym.evaluation.summary import scores_of
 
 POLICIES = ("ppo", "ppo-shield", "sac", "sac-shield", "straight-line-shield", "clrrt")
 YARDSTICK = "clrrt"  # plans row by row, so it flies fewer worlds
@@ -55,21 +55,18 @@ def fly_shape(name: str, source: PolicySource, episodes: int, seed: int) -> dict
     """One cell: a policy in the worlds of a shape; `failures` by seed."""
     shape = SHAPES[name]
     env = gym.make("HydroneGym/Mission-v0", **shape.options)
-    ends = fly_worlds(source.make(env, 0), SHAPED, episodes=episodes, seed=seed, options={"shape": name})
-    env.close()
-    score, lost = score_of(SHAPED, ends), np.flatnonzero(ends.outcome != Outcome.GOAL)
+    rows = gym.make_vec(SHAPED, num_envs=episodes, vectorization_mode="vector_entry_point", shape=name)
+    endings = fly_worlds(rows, source.make(env, 0), seed=seed)
+    records = [record_of((name, SHAPED, seed + k, source.label), ending) for k, ending in enumerate(endings)]
+    (score,) = scores_of(records)
+    del score["mission"]
     return {
         "shape": name,
         "group": shape.group,
         "reference": shape.reference,
         "policy": source.label,
-        "episodes": score.episodes,
-        "outcomes": score.outcomes,
-        "success": score.success,
-        "interval": score.interval,
-        "time": score.time,
-        "energy": score.energy,
-        "failures": {str(seed + k): Outcome(ends.outcome[k]).name for k in lost.tolist()},
+        **score,
+        "failures": {str(record.world): record.outcome for record in records if not record.success},
     }
 
 
@@ -78,6 +75,8 @@ def measure(a: Arguments) -> dict[str, Any]:
     unknown = [name for name in a.shapes if name not in SHAPES]
     if unknown:
         raise ValueError(f"no shape {', '.join(map(repr, unknown))}: known are {', '.join(map(repr, SHAPES))}")
+    if a.episodes < 1:
+        raise ValueError(f"episodes must be at least 1, got {a.episodes}")
     sources, console, cells, began = find_policies(a.policies), Console(stderr=True), [], time.process_time()
     for name in a.shapes:
         for source in sources:

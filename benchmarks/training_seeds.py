@@ -20,13 +20,13 @@ import tyro
 from rich.console import Console
 
 from agents.checkpoint import checkpoints
-from agents.evaluation import evaluate_missions
 from agents.recipe import load_recipe
 from agents.run_log import CHECKPOINTS, CURVE, FAILURES
 from agents.training import TrainingRun, resume, train
 from benchmarks.tables import Sheet, number
 from benchmarks.timing import RESULTS, save
 from benchmarks.world_shapes import SHAPES
+from hydrone_gym.evaluation import evaluate_held_out
 
 BEGINS_WITH = {"ppo_shielded": "ppo"}  # recipe: the one whose weights of the same seed it goes on from
 DENSE = SHAPES["40 larger spheres"]
@@ -87,10 +87,10 @@ def flights(recipe: str, folder: Path, episodes: int) -> list[dict[str, Any]]:
     shield = load_recipe(recipe).shield
     cells = []
     for worlds, options in (("20 spheres", {}), *([(DENSE.name, DENSE.options)] if shield else [])):
-        for score in evaluate_missions(folder / "agent", shield=shield, episodes=episodes, options=options):
-            cells.append(
-                {"worlds": worlds, "mission": score.mission, "outcomes": score.outcomes, "share": score.success}
-            )
+        _, scores = evaluate_held_out(f"{folder / 'agent'}{'+shield' * shield}", worlds=episodes, options=options)
+        for score in scores:
+            told = {"mission": score["mission"], "outcomes": score["outcomes"], "share": score["success"]}
+            cells.append({"worlds": worlds, **told})
     return cells
 
 

@@ -16,6 +16,7 @@ from agents.failures.flights import FailedFlight
 from agents.failures.worlds import share_of_way
 from hydrone_gym.evaluation.flight import Flight
 from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import gaps_along
 from hydrone_gym.world.world import World
 
@@ -84,36 +85,23 @@ class Chance(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Failure:
-    """One flight that did not arrive.
+    """One flight that did not arrive."""
 
-    Attributes:
-        mission: environment id.
-        seed: of the world.
-        outcome: how it ended.
-        cause: one of `CAUSES`.
-        end: where and how.
-        contact: of a collision, else None.
-        chance: None for a time-out, and if there never was one.
-        stayed_s: how long it had been within 1 m of where it ended, s.
-        interventions: periods in which a shield flew another reference than proposed; None without one.
-        path: (K, 2) share of the way and height in m, at every decision and at the end.
-    """
-
-    mission: str
-    seed: int
-    outcome: Outcome
-    cause: str
-    end: End
-    contact: Contact | None
-    chance: Chance | None
-    stayed_s: float
-    interventions: int | None
-    path: NDArray[np.float64]
+    mission: str  # environment id
+    seed: int  # of the world
+    outcome: Outcome  # how it ended
+    cause: str  # one of `CAUSES`
+    end: End  # where and how
+    contact: Contact | None  # of a collision, else None
+    chance: Chance | None  # None for a time-out, and if there never was one
+    stayed_s: float  # how long it had been within 1 m of where it ended, s
+    interventions: int | None  # periods in which a shield flew another reference than proposed; None without one
+    path: NDArray[np.float64]  # (K, 2) share of the way and height in m, at every decision and at the end
 
 
-def examine(failed: FailedFlight, world: World) -> Failure:
-    """Work out why a flight failed; `world` is that of its environment."""
-    flight = failed.flight
+def examine(failed: FailedFlight) -> Failure:
+    """Work out why a flight failed."""
+    flight, world = failed.flight, failed.world
     end, contact = _end(flight, world), _contact(failed)
     chance = _last_chance(failed, contact)
     share = share_of_way(flight.states[:, :3], flight.scenario.start[:3], flight.scenario.goal)
@@ -138,9 +126,9 @@ def _end(flight: Flight, world: World) -> End:
     entry = int(outside[-1]) + 1  # missions begin outside the zone
     inside = entry < len(states)
     if inside:
-        part = FROM_AIR if states[entry - 1, 2] > 0.0 else FROM_WATER
+        part = FROM_AIR if in_air(states[entry - 1, 2]) else FROM_WATER
     else:
-        part = AIR_LEG if last[2] > 0.0 else WATER_LEG
+        part = AIR_LEG if in_air(last[2]) else WATER_LEG
     speed, climb, tilt = float(np.hypot(*last[6:8])), float(last[8]), float(np.arccos(np.cos(last[3:5]).prod()))
     if flight.outcome is Outcome.ROUGH_TRANSITION:
         speed, tilt, climb = (flight.transitions[-1][key] for key in ("lateral_speed", "tilt", "vertical_speed"))
@@ -152,7 +140,7 @@ def _end(flight: Flight, world: World) -> End:
         z_m=z,
         share_of_way=float(share_of_way(last[None, :3], flight.scenario.start[:3], flight.scenario.goal)[0]),
         part=part,
-        medium="air" if last[2] > 0.0 else "water",
+        medium="air" if in_air(last[2]) else "water",
         horizontal_speed_m_s=speed,
         vertical_speed_m_s=climb,
         tilt_deg=float(np.degrees(tilt)),

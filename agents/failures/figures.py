@@ -48,13 +48,7 @@ _FEWEST = 30  # worlds that a point needs, or its interval says nothing
 
 
 def draw_where(failures: Sequence[Failure], missions: Sequence[str], world: World) -> Figure:
-    """Draw from the side where flights failed, a panel a mission: their paths and a mark of the cause at the end.
-
-    Args:
-        failures: of all missions.
-        missions: environment ids.
-        world: of the environments, for the box and the transition zone.
-    """
+    """Draw from the side where flights failed, a panel a mission: their paths and a mark of the cause at the end."""
     figure, panels = _panels(len(missions), (10.0, 5.0), sharey=True)
     for panel, mission in zip(panels, missions, strict=True):
         those = [failure for failure in failures if failure.mission == mission]
@@ -103,8 +97,7 @@ def draw_how(failures: Sequence[Failure]) -> Figure:
 def draw_worlds(worlds: Sequence[tuple[str, Features, NDArray[np.bool_]]]) -> Figure:
     """Draw success against what worlds have in common, with 95 % Wilson intervals.
 
-    Args:
-        worlds: for each mission its environment id, the features of its worlds, and (n,) which flights arrived.
+    `worlds` has for each mission its environment id, the features of its worlds, and (n,) which flights arrived.
     """
     figure, panels = _panels(3, (10.0, 4.4), sharey=True)
     for number, (mission, features, arrived) in enumerate(worlds):

@@ -1,97 +1,70 @@
-"""Where and why an agent fails, in words and figures.
+"""`hydrone failures`: where and why an agent fails, in words and figures; docs/failures.md explains the columns."""
 
-``python -m agents.failures --agent ppo --out failures`` flies the held-out worlds of every mission, flies those that
-failed once more with everything kept, and writes what it finds to a folder. docs/failures.md explains the columns.
-"""
-
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from tqdm import tqdm
 
-from agents.evaluation import (
-    HELD_OUT,
-    MISSIONS,
-    Ends,
-    HeldOutWorlds,
-    fly_worlds,
-    policy_for,
-    run_command,
-    score_of,
-    score_table,
-)
 from agents.failures.causes import Failure, examine
 from agents.failures.figures import draw_how, draw_where, draw_worlds
-from agents.failures.flights import fly_again
+from agents.failures.flights import fly_failed
 from agents.failures.tables import failure_tables, write_failures
 from agents.failures.worlds import features_of
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.plan import Plan, make_plan
+from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.run import carry_out
+from hydrone_gym.evaluation.suites import HELD_OUT, MISSIONS, Suite
+from hydrone_gym.evaluation.summary import scores_of, summarise
+from hydrone_gym.evaluation.tables import markdown, tables_of
 from hydrone_gym.rendering.style import DOTS_PER_INCH
-from hydrone_gym.simulation.outcome import Outcome
 
 
-def find_failures(
-    policy: Policy,
-    mission: str,
-    *,
-    episodes: int = 1000,
-    seed: int = HELD_OUT,
-    options: Mapping[str, Any] | None = None,
-) -> tuple[Ends, list[Failure]]:
-    """Fly a policy in many worlds of a mission, and those where it failed once more, singly.
-
-    Args and errors as in `agents.evaluation.fly_worlds`; also ValueError for a policy that flies otherwise alone.
+def find_failures(plan: Plan, *, progress: bool = False) -> tuple[list[Record], list[Failure]]:
+    """Fly a plan of `Suite.held_out` worlds and one policy, and those flights that failed once more, singly.
 
     Returns:
-        How all flights ended, and the failures in order of their seeds.
+        The records of all flights, and the failures in the same order; bars on stderr show the `progress`.
+
+    Raises:
+        EvaluationStopped: the policy raised.
+        ValueError: a policy that flies otherwise alone than in a batch.
     """
-    ends = fly_worlds(policy, mission, episodes=episodes, seed=seed, options=options)
-    env = gym.make(mission, **(options or {}))
-    world: Any = env.get_wrapper_attr("world")
-    failures = []
-    for row in tqdm(np.flatnonzero(ends.outcome != Outcome.GOAL), desc=mission, unit="flight", disable=None):
-        flown = fly_again(env, policy, mission, seed + int(row), Outcome(ends.outcome[row]))
-        failures.append(examine(flown, world))
-    return ends, failures
+    records, failures = carry_out(plan, progress=progress), []
+    failed = [record for record in records if not record.success]
+    for record in tqdm(failed, desc="failures", unit="flight", disable=None if progress else True):
+        job = plan.job_of(record)
+        env = job.make_env()
+        told = {"mission": job.env_id, "seed": HELD_OUT + record.world, "outcome": record.outcome}
+        failures.append(examine(fly_failed(env, job.policy.make(env, job.seed), job.worlds[0][1], **told)))
+    return records, failures
 
 
-@dataclass(frozen=True, kw_only=True)
-class FailureReport(HeldOutWorlds):
-    """Fly an agent in many held-out worlds, and say where and why it fails: tables, failures.csv and figures."""
+def write_failure_report(
+    policy: str, folder: Path, *, worlds: int, options: Mapping[str, Any], progress: bool = False
+) -> tuple[str, dict[str, Any]]:
+    """Fly held-out worlds and write tables, `failures.csv` and figures; return the tables and the same as plain data.
 
-    out: Path
-    """Folder to write to."""
-
-    def text(self) -> str:
-        """Fly, write everything to the folder and return the tables; raises as `find_failures` and `policy_for` do."""
-        self.out.mkdir(parents=True, exist_ok=True)
-        scores, failures, worlds = [], [], []
-        for mission in MISSIONS:
-            env = gym.make(mission, **self.options)
-            policy = policy_for(self.agent, env, shield=self.shield)
-            ends, failed = find_failures(policy, mission, episodes=self.episodes, options=self.options)
-            scores.append(score_of(mission, ends))
-            failures += failed
-            seeds = np.arange(HELD_OUT, HELD_OUT + self.episodes)
-            worlds.append((mission, features_of(env, seeds), ends.outcome == Outcome.GOAL))
-        world: Any = env.get_wrapper_attr("world")
-        figures = {
-            "where": draw_where(failures, MISSIONS, world),
-            "how": draw_how(failures),
-            "worlds": draw_worlds(worlds),
-        }
-        for name, figure in figures.items():
-            figure.savefig(self.out / f"failures-{name}.png", dpi=DOTS_PER_INCH)
-        write_failures(failures, self.out / "failures.csv")
-        text = f"{score_table(scores)}\n\n{failure_tables(failures, scores)}"
-        (self.out / "failures.md").write_text(text + "\n", encoding="utf-8")
-        return text
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Report the failures of an agent as the arguments say; see `agents.evaluation.run_command`."""
-    return run_command(FailureReport, "failures", arguments)
+    Arguments are those of `evaluate_held_out`; the folder is made if missing. Raises what `find_failures` and
+    `make_plan` do.
+    """
+    others = {name: value for name, value in options.items() if name != "vehicle"}
+    plan = make_plan(Suite.held_out(worlds, others), policy, worlds=worlds, vehicle=options["vehicle"])
+    folder.mkdir(parents=True, exist_ok=True)
+    records, failures = find_failures(plan, progress=progress)
+    env: Any = next(plan.jobs()).make_env().unwrapped
+    reach = env.world.zone + env.vehicle.radius
+    seen = []
+    for mission in plan.suites[0].missions:
+        arrived = np.array([record.success for record in records if record.mission == mission.name])
+        seen.append((mission.env_id, features_of(mission.scenarios, reach), arrived))
+    drawn = (draw_where(failures, MISSIONS, env.world), draw_how(failures), draw_worlds(seen))
+    for name, figure in zip(("where", "how", "worlds"), drawn, strict=True):
+        figure.savefig(folder / f"failures-{name}.png", dpi=DOTS_PER_INCH)
+    write_failures(failures, folder / "failures.csv")
+    outcomes = [table for table in tables_of(summarise(records)) if table.title.endswith("outcomes")]
+    text = f"{markdown(outcomes)}\n{failure_tables(failures, MISSIONS, worlds)}"
+    (folder / "failures.md").write_text(text + "\n", encoding="utf-8")
+    told = [{"mission": f.mission, "seed": f.seed, "outcome": f.outcome.name, "cause": f.cause} for f in failures]
+    return text, {"folder": str(folder), "scores": scores_of(records), "failures": told}

@@ -6,21 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.evaluation import Score
 from agents.failures.causes import CAUSES, PARTS, Chance, Contact, End, Failure
 
 # Units are part of the names; docs/failures.md says what each column means.
-COLUMNS = (
-    "mission",
-    "seed",
-    "outcome",
-    "cause",
-    *End._fields,
-    *Contact._fields,
-    *Chance._fields,
-    "stayed_s",
-    "interventions",
-)
+_FOUND = (*End._fields, *Contact._fields, *Chance._fields)
+COLUMNS = ("mission", "seed", "outcome", "cause", *_FOUND, "stayed_s", "interventions")
 
 
 def write_failures(failures: Sequence[Failure], path: Path) -> None:
@@ -39,16 +29,15 @@ def _line(failure: Failure) -> list[object]:
     return [round(cell, 4) if isinstance(cell, float) else cell for cell in cells]
 
 
-def failure_tables(failures: Sequence[Failure], scores: Sequence[Score]) -> str:
+def failure_tables(failures: Sequence[Failure], missions: Sequence[str], worlds: int) -> str:
     """Return Markdown tables: causes and parts of the flight by mission, and the typical numbers of each cause.
 
-    Args:
-        failures: of all missions.
-        scores: one a mission, in the order of the columns.
+    `missions` are the environment ids in the order of the columns, `worlds` how many were flown in each.
     """
-    parts = [_counts("cause", CAUSES, lambda failure: failure.cause, failures, scores)]
+    parts = [_counts("cause", CAUSES, lambda failure: failure.cause, failures, missions, worlds)]
     if failures:
-        parts += [_counts("where", PARTS, lambda failure: failure.end.part, failures, scores), _typical(failures)]
+        parts.append(_counts("where", PARTS, lambda failure: failure.end.part, failures, missions, worlds))
+        parts.append(_typical(failures))
     return "\n\n".join(parts)
 
 
@@ -57,45 +46,38 @@ def _counts(
     kinds: Sequence[str],
     kind_of: Callable[[Failure], str],
     failures: Sequence[Failure],
-    scores: Sequence[Score],
+    missions: Sequence[str],
+    worlds: int,
 ) -> str:
     """Count failures of each kind in each mission, with their share of the mission's failures."""
-    missions = [score.mission for score in scores]
-    lines = [_row(title, *map(short_name, missions)), _row("---", *["---:"] * len(missions))]
-    of_mission = {name: [kind_of(failure) for failure in failures if failure.mission == name] for name in missions}
-    for kind in kinds:
-        counts = [of_mission[name].count(kind) for name in missions]
-        if any(counts):
-            lines.append(
-                _row(kind, *(_share(n, len(of_mission[name])) for n, name in zip(counts, missions, strict=True)))
-            )
-    totals = [(len(of_mission[score.mission]), score.episodes) for score in scores]
-    lines.append(_row("failures of worlds", *(f"{n} of {m} ({100.0 * n / m:.2f} %)" for n, m in totals)))
-    return "\n".join(lines)
+    columns = [[kind_of(failure) for failure in failures if failure.mission == mission] for mission in missions]
+    rows = [(kind, *(_share(column.count(kind), len(column)) for column in columns)) for kind in kinds]
+    rows = [row for row in rows if any(cell != "0" for cell in row[1:])]
+    totals = (f"{len(column)} of {worlds} ({100.0 * len(column) / worlds:.2f} %)" for column in columns)
+    return _table((title, *map(short_name, missions)), [*rows, ("failures of worlds", *totals)])
 
 
 def _typical(failures: Sequence[Failure]) -> str:
     """Return the medians of what led to each cause, over all missions."""
     speeds = ("horizontal m/s", "vertical m/s", "closing m/s")
     heads = ("flights", *speeds, "known s", "last chance s", "speed then m/s", "stayed s")
-    lines = [_row("medians", *heads), _row("---", *["---:"] * len(heads))]
+    rows = []
     for cause in CAUSES:
         those = [failure for failure in failures if failure.cause == cause]
-        if not those:
-            continue
         contacts = [failure.contact for failure in those if failure.contact is not None]
         chances = [failure.chance for failure in those if failure.chance is not None]
-        cells = (
-            _median([failure.end.horizontal_speed_m_s for failure in those]),
-            _median([failure.end.vertical_speed_m_s for failure in those]),
-            _median([contact.closing_speed_m_s for contact in contacts]),
-            _median([contact.known_s for contact in contacts if contact.known_s is not None]),
-            _median([chance.last_chance_s for chance in chances]),
-            _median([chance.last_chance_speed_m_s for chance in chances]),
-            _median([failure.stayed_s for failure in those]),
+        values = (
+            [failure.end.horizontal_speed_m_s for failure in those],
+            [failure.end.vertical_speed_m_s for failure in those],
+            [contact.closing_speed_m_s for contact in contacts],
+            [contact.known_s for contact in contacts if contact.known_s is not None],
+            [chance.last_chance_s for chance in chances],
+            [chance.last_chance_speed_m_s for chance in chances],
+            [failure.stayed_s for failure in those],
         )
-        lines.append(_row(cause, str(len(those)), *cells))
-    return "\n".join(lines)
+        if those:
+            rows.append((cause, str(len(those)), *map(_median, values)))
+    return _table(("medians", *heads), rows)
 
 
 def _median(values: Sequence[float]) -> str:
@@ -111,5 +93,6 @@ def short_name(mission: str) -> str:
     return mission.removeprefix("HydroneGym/").removesuffix("-v0")
 
 
-def _row(*cells: str) -> str:
-    return f"| {' | '.join(cells)} |"
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = (heads, ("---", *["---:"] * (len(heads) - 1)), *rows)
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

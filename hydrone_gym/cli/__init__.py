@@ -1,42 +1,95 @@
-"""The command `hydrone`: one module a subcommand, whose class has the options as fields and `run`, the exit code.
+"""The command `hydrone`, whose subcommands are found by entry points of the group `hydrone_gym.commands`.
+
+A subcommand is a class whose fields are the options and whose `run` returns the exit code; the first line of its
+docstring is what `hydrone --help` shows, and an extra that it needs is its class variable `EXTRA`. Only the one asked
+for is imported.
 
 Exit codes: 0 success; 1 a mission that did not end at the goal, or an evaluation that could not be finished; 2 bad
 input, told in one line; 130 an evaluation stopped by Ctrl-C.
 """
 
+import inspect
 import os
 import sys
+import textwrap
 from collections.abc import Sequence
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
 
-import tyro
+from gymnasium.error import DependencyNotInstalled
 
-from agents.clone_command import Clone, Demonstrate
-from agents.train_command import Train
-from hydrone_gym.cli.evaluate import Evaluate
-from hydrone_gym.cli.fly import Fly
-from hydrone_gym.cli.replay import Replay
+from hydrone_gym.cli.compiling import tell_compiling
+from hydrone_gym.evaluation.run import EvaluationStopped
+
+GROUP = "hydrone_gym.commands"
+MOST_OBSTACLES = 1000  # of an option; more take minutes to place
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `arguments` default to those of the process."""
-    command = tyro.extras.subcommand_cli_from_dict(
-        {
-            "fly": Fly,
-            "evaluate": Evaluate,
-            "replay": Replay,
-            "train": Train,
-            "demonstrate": Demonstrate,
-            "clone": Clone,
-        },
-        prog="hydrone",
-        description="Fly the HyDrone in air, through the water surface and below it.",
-        args=arguments,
-        config=(tyro.conf.FlagCreatePairsOff,),
-    )
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    commands = {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name)}
+    if not given or given[0] not in commands:
+        return _help(commands, given)
     try:
-        code = command.run()
+        kind = commands[given[0]].load()
+    except Exception as error:  # of somebody else's package
+        return refused(f"{given[0]} cannot be loaded: {type(error).__name__}: {error}")
+    try:
+        code = _parsed(kind, given).run()
         sys.stdout.flush()
     except BrokenPipeError:  # the reader, `head` say, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except ImportError as error:
+        extra = getattr(kind, "EXTRA", "")
+        return refused(f'{error}; this needs: pip install "hydrone-gym[{extra}]"' if extra else error)
+    except EvaluationStopped as error:
+        return refused(error, 1)
+    except (ValueError, TypeError, OSError, DependencyNotInstalled) as error:
+        return refused(error)
     return code
+
+
+def refused(reason: object, code: int = 2) -> int:
+    """Tell in one line why a command ends, and return its exit code."""
+    print("hydrone: error:", " ".join(str(reason).split()), file=sys.stderr)
+    return code
+
+
+def check_obstacles(count: int | None) -> None:
+    """Raise ValueError for more spheres than an option may ask for."""
+    if count is not None and count > MOST_OBSTACLES:
+        raise ValueError(f"--obstacles must be at most {MOST_OBSTACLES}, got {count}")
+
+
+def _parsed(kind: Any, given: list[str]) -> Any:
+    """Return the command with the options given; SystemExit for --help and for what cannot be parsed."""
+    import tyro
+
+    command = tyro.cli(kind, args=given[1:], prog=f"hydrone {given[0]}", config=(tyro.conf.FlagCreatePairsOff,))
+    tell_compiling()
+    return command
+
+
+def _help(commands: dict[str, EntryPoint], given: list[str]) -> int:
+    """Print what subcommands there are; raise SystemExit if one was asked for that is not among them."""
+    usage = "usage: hydrone [-h] COMMAND …"
+    if not given or given[0] not in ("-h", "--help"):
+        wrong = f"no command {given[0]!r}" if given else "a command is missing"
+        print(f"{usage}\nhydrone: error: {wrong}: known are {', '.join(commands)}", file=sys.stderr)
+        raise SystemExit(2)
+    print(f"{usage}\n\nFly the HyDrone in air, through the water surface and below it.\n\ncommands:")
+    for name, entry in commands.items():
+        lead = f"  {name:<14}"
+        print(textwrap.fill(_about(entry), 100, initial_indent=lead, subsequent_indent=" " * len(lead)))
+    print("\n`hydrone COMMAND --help` lists the options of a command.")
+    return 0
+
+
+def _about(entry: EntryPoint) -> str:
+    """Return the first line of a command's docstring, or why it cannot be loaded."""
+    try:
+        return (inspect.getdoc(entry.load()) or "").partition("\n")[0]
+    except Exception as error:
+        return f"cannot be loaded: {type(error).__name__}: {error}"

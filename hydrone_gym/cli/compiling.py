@@ -1,26 +1,28 @@
-"""Why nothing seems to happen on the first run after an install."""
+"""Why nothing seems to happen on the first run after an install: each kernel that is compiled is named meanwhile."""
 
+import functools
 import sys
-from pathlib import Path
 from typing import Any
 
-from hydrone_gym.evaluation.policies import PolicySource
-from hydrone_gym.simulation.rows import advance_rows
-from planners.cl_rrt.execute import cycle
-from planners.stop_check import guard
 
-COMPILING = "compiling kernels (once after install, about 30 s)"
+@functools.cache
+def tell_compiling() -> None:
+    """From now on say on stderr which kernel is being compiled; one that is loaded from the cache is not told."""
+    from numba.core import event
 
-_PARTS = {"CLRRT": cycle, "shield": guard}  # what the origin of a policy that uses a kernel has in it
+    class Teller(event.Listener):
+        depth = 0  # kernels compile others that they are made of
+
+        def on_start(self, event: Any) -> None:
+            if self.depth == 0:
+                function = event.data["dispatcher"].py_func
+                print(COMPILING.format(f"{function.__module__}.{function.__name__}"), file=sys.stderr, flush=True)
+            self.depth += 1
+
+        def on_end(self, event: Any) -> None:
+            self.depth -= 1
+
+    event.register("numba:compile", Teller())
 
 
-def kernels_of(*policies: PolicySource) -> list[Any]:
-    """Return the large kernels that flights with these policies are known to need."""
-    return [advance_rows, *(kernel for part, kernel in _PARTS.items() if any(part in p.origin for p in policies))]
-
-
-def announce_compiling(*kernels: Any) -> None:
-    """Say on stderr that kernels are compiled, if one of these large ones is not in the cache yet."""
-    folders = [kernel.stats.cache_path for kernel in kernels]
-    if not all(folder and any(Path(folder).glob("*.nbi")) for folder in folders):
-        print(COMPILING, file=sys.stderr, flush=True)
+COMPILING = "hydrone: compiling {} (once after an install)"

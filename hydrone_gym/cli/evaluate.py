@@ -9,14 +9,13 @@ from typing import Literal
 
 from gymnasium.error import DependencyNotInstalled
 
-from hydrone_gym.cli.compiling import announce_compiling, kernels_of
+from hydrone_gym.cli import refused
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
-from hydrone_gym.evaluation.replays import Writer
-from hydrone_gym.evaluation.results import write_results
-from hydrone_gym.evaluation.run import EvaluationStopped, carry_out
-from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, RunFolder
+from hydrone_gym.evaluation.run import carry_out
+from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, RunFolder, write_results
+from hydrone_gym.evaluation.shown import Writer
 from hydrone_gym.evaluation.tables import print_tables
 from hydrone_gym.rendering.replay import load_viser, write_replay
 
@@ -31,9 +30,9 @@ class Evaluate:
     """
 
     suites: tuple[str, ...] = ("paper-20",)
-    """Frozen suites paper-20, dense-40, missions, density; or files or folders of your own scenarios."""
+    """Frozen suites paper-20, dense-40, missions, density; held-out, flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
-    """Registered names, module:attribute, file.py:attribute or an agent's folder, each also as LABEL=…"""
+    """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
     worlds: int = 100
     """First so many worlds of each mission."""
     seed: int = 0
@@ -59,35 +58,29 @@ class Evaluate:
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
+        plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
+        labels = [policy.label for policy in plan.policies]
+        if self.baseline is not None and self.baseline not in labels:
+            raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")
+        out = Path("evaluations") / "+".join(suite.name for suite in plan.suites) if self.out is None else self.out
+        folder = RunFolder(out, plan.arguments(), overwrite=self.overwrite)
+        if self.report is not None:
+            self.report.mkdir(parents=True, exist_ok=True)
         try:
-            plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
-            self._check_baseline([policy.label for policy in plan.policies])
-            folder = RunFolder(self._folder(plan), plan.arguments(), overwrite=self.overwrite)
-            if self.report is not None:
-                self.report.mkdir(parents=True, exist_ok=True)
-        except (ValueError, OSError) as error:
-            print(f"hydrone: error: {error}", file=sys.stderr)
-            return 2
-        return self._fly(plan, folder)
+            return self._fly(plan, folder)
+        except OSError as error:  # a full disk, after the input was found good
+            return refused(error, 1)
+        except KeyboardInterrupt:
+            print("hydrone: interrupted; finished flights are kept, the same command goes on", file=sys.stderr)
+            return INTERRUPTED
 
     def _fly(self, plan: Plan, folder: RunFolder) -> int:
         """Carry the plan out, write and show what came of it, and return the exit code."""
         began = time.perf_counter()
-        announce_compiling(*kernels_of(*plan.policies))
-        try:
-            records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
-            seconds = time.perf_counter() - began
-            document, tables = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
-            pages = [] if self.report is None else [self._report(plan, folder.folder, self.report)]
-        except (EvaluationStopped, OSError) as error:
-            print(f"hydrone: error: {error}", file=sys.stderr)
-            return 1
-        except ValueError as error:
-            print(f"hydrone: error: {error}", file=sys.stderr)
-            return 2
-        except KeyboardInterrupt:
-            print("hydrone: interrupted; finished flights are kept, the same command goes on", file=sys.stderr)
-            return INTERRUPTED
+        records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
+        seconds = time.perf_counter() - began
+        document, tables = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
+        pages = [] if self.report is None else [self._report(plan, folder.folder, self.report)]
         if self.json:
             print(json.dumps(document, indent=1, allow_nan=False))
             return 0
@@ -106,12 +99,3 @@ class Evaluate:
             except DependencyNotInstalled as error:
                 print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
         return write_report(folder, into=target, plan=plan, replay=writer)
-
-    def _check_baseline(self, labels: list[str]) -> None:
-        """Raise ValueError for a baseline that does not fly."""
-        if self.baseline is not None and self.baseline not in labels:
-            raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")
-
-    def _folder(self, plan: Plan) -> Path:
-        names = "+".join(suite.name for suite in plan.suites)
-        return Path("evaluations") / names if self.out is None else self.out

@@ -1,20 +1,17 @@
 """The subcommand `hydrone fly`: the paper's experiments, a table and figures."""
 
-import itertools
 import json
 import math
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hydrone_gym.cli.missions import Mission, MissionOptions
+from tqdm import tqdm
+
+from hydrone_gym.cli.missions import MissionOptions, Prepared
 from hydrone_gym.evaluation.flight import Flight, fly
-from hydrone_gym.evaluation.report import draw_flight, flight_record
-from hydrone_gym.evaluation.saved import FORMAT, VERSION
-from planners import CLRRT
+from hydrone_gym.evaluation.flight_figures import draw_flight
+from hydrone_gym.evaluation.saved import FORMAT, VERSION, flight_record
 
 _TREE_ITERATIONS = 400  # samples of the tree figure
 
@@ -32,30 +29,20 @@ class Fly(MissionOptions):
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
-        try:
-            missions = self.missions()
-            self.out.mkdir(parents=True, exist_ok=True)
-        except (ValueError, OSError) as error:
-            print(f"hydrone: error: {error}", file=sys.stderr)
-            return 2
+        missions = self.prepare()
+        self.out.mkdir(parents=True, exist_ok=True)
         records = []
-        with _progress(len(missions) * (1 if self.no_figures else 3)) as step:
-            for mission in missions:
-                step(f"{mission.name}: flying")
+        with tqdm(missions, unit="flight", disable=None) as bar:
+            for mission in bar:
+                bar.set_description(f"{mission.name}: flying")
                 mission.policy.predict(mission.observation)  # loads the kernels: no cycle's time shall hold that
                 flight = fly(mission.env, mission.policy, seed=self.seed, scenario=mission.scenario)
-                files = [] if self.no_figures else self._draw(mission, flight, step)
+                bar.set_description(f"{mission.name}: drawing")
+                files = [] if self.no_figures else _draw(mission, flight, self.out)
                 figures = [str(file) for file in files]
                 records.append({"name": mission.name, **flight_record(flight), "figures": figures})
         self._report(records)
         return 0 if all(record["success"] for record in records) else 1
-
-    def _draw(self, mission: Mission, flight: Flight, step: Callable[[str], None]) -> list[Path]:
-        """Write the figures of one mission; return their paths."""
-        step(f"{mission.name}: drawing the flight")
-        files = draw_flight(flight, mission.env.get_wrapper_attr("simulation"), self.out, mission.name)
-        step(f"{mission.name}: drawing the tree")
-        return files + _draw_tree(mission, self.out)
 
     def _report(self, records: list[dict[str, Any]]) -> None:
         """Write flight.json, and print it or the table."""
@@ -72,30 +59,21 @@ class Fly(MissionOptions):
             print(path)
 
 
-@contextmanager
-def _progress(steps: int) -> Iterator[Callable[[str], None]]:
-    """Show a progress line on stderr; yields a function that names the next step."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task, begun = bar.add_task("", total=steps), itertools.count()
-
-        def step(description: str) -> None:
-            bar.update(task, description=description, completed=next(begun), refresh=True)
-
-        yield step
+def _draw(mission: Prepared, flight: Flight, folder: Path) -> list[Path]:
+    """Write the figures of one mission; return their paths."""
+    files = draw_flight(flight, mission.env.get_wrapper_attr("simulation"), folder, mission.name)
+    return files + _draw_tree(mission, folder)
 
 
-def _draw_tree(mission: Mission, folder: Path) -> list[Path]:
-    """Draw the tree that the CL-RRT grows from the start when every obstacle is known (paper, Fig. 5)."""
-    if not isinstance(mission.policy, CLRRT):
+def _draw_tree(mission: Prepared, folder: Path) -> list[Path]:
+    """Draw the tree that a planner with `grow_tree` grows from the start, every obstacle known (paper, Fig. 5)."""
+    grow_tree = getattr(mission.policy, "grow_tree", None)
+    if grow_tree is None:
         return []
     from hydrone_gym.rendering.figures import plot_tree, save_figure
 
     everything = {**mission.observation, "obstacles": mission.scenario.obstacles}
-    tree = mission.policy.grow_tree(everything, _TREE_ITERATIONS)
+    tree = grow_tree(everything, _TREE_ITERATIONS)
     world = mission.env.get_wrapper_attr("world")
     title = f"{mission.name.replace('-', ' ').capitalize()}: tree of {len(tree.edges)} edges, every obstacle known"
     figure = plot_tree(tree, mission.scenario, world, title=title)

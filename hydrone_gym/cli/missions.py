@@ -1,24 +1,22 @@
-"""What subcommands fly: the options that say it, and the environments and policies they ask for."""
+"""What `hydrone fly` and `hydrone replay` fly: the options that say it, and the environments and policies asked for."""
 
-from dataclasses import dataclass
+import functools
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 
-from hydrone_gym.cli.compiling import announce_compiling, kernels_of
-from hydrone_gym.evaluation.policies import find_policy
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.cli import check_obstacles
+from hydrone_gym.evaluation.policies import Policy, PolicySource, find_policy, load_factory
 from hydrone_gym.world.scenario import Scenario, load_scenario
-from planners import CLRRT
 
 EXPERIMENTS = {1: "HydroneGym/AirToWater-v0", 2: "HydroneGym/WaterToAir-v0"}
 
 
-@dataclass(frozen=True)
-class Mission:
-    """One thing to fly: where, with what, and what the files and the column of the table are called."""
+class Prepared(NamedTuple):
+    """One flight about to begin: where, with what, and what the files and the column of the table are called."""
 
     name: str
     env: gym.Env
@@ -48,35 +46,39 @@ class MissionOptions:
     vehicle: Literal["paper", "physical"] = "paper"
     """Parameter set of the vehicle."""
 
-    def missions(self) -> list[Mission]:
+    def prepare(self) -> list[Prepared]:
         """Check the options and set up what they ask for; raises ValueError or OSError."""
         if self.seed < 0:
             raise ValueError(f"--seed must not be negative, got {self.seed}")
-        if self.iterations is not None and self.time_budget is not None:
-            raise ValueError("--iterations and --time-budget exclude each other")
-        if self.policy != "clrrt" and (self.iterations is not None or self.time_budget is not None):
-            raise ValueError("--iterations and --time-budget are options of --policy clrrt")
-        source = find_policy(self.policy)
+        check_obstacles(self.obstacles)
+        source = self._source()
         if self.scenario is None:
-            announce_compiling(*kernels_of(source))
             numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
             count = 20 if self.obstacles is None else self.obstacles
-            return [self._mission(f"experiment-{number}", EXPERIMENTS[number], count, None) for number in numbers]
+            return [self._made(f"experiment-{k}", EXPERIMENTS[k], count, None, source) for k in numbers]
         if self.experiment is not None or self.obstacles is not None:
             raise ValueError("--scenario excludes --experiment and --obstacles")
         scenario = load_scenario(self.scenario)
-        announce_compiling(*kernels_of(source))
-        return [self._mission(self.scenario.stem, "HydroneGym/Mission-v0", len(scenario.obstacles), scenario)]
+        count = len(scenario.obstacles)
+        return [self._made(self.scenario.stem, "HydroneGym/Mission-v0", count, scenario, source)]
 
-    def _mission(self, name: str, env_id: str, obstacles: int, scenario: Scenario | None) -> Mission:
+    def _made(
+        self, name: str, env_id: str, obstacles: int, scenario: Scenario | None, source: PolicySource
+    ) -> Prepared:
         """Make environment and policy; without a scenario the seed draws one."""
         env = gym.make(env_id, num_obstacles=obstacles, vehicle=self.vehicle)
         observation, _ = env.reset(seed=self.seed, options=None if scenario is None else {"scenario": scenario})
-        return Mission(name, env, self._policy(env), env.get_wrapper_attr("scenario"), observation)
+        return Prepared(name, env, source.make(env, self.seed), env.get_wrapper_attr("scenario"), observation)
 
-    def _policy(self, env: gym.Env) -> Policy:
-        if self.time_budget is not None:
-            return CLRRT.for_env(env, time_budget=self.time_budget, seed=self.seed)
-        if self.iterations is not None:
-            return CLRRT.for_env(env, iterations=self.iterations, seed=self.seed)
-        return find_policy(self.policy).make(env, self.seed)
+    def _source(self) -> PolicySource:
+        """Find the policy, with the options that belong to the CL-RRT alone."""
+        given: dict[str, Any] = {"iterations": self.iterations, "time_budget": self.time_budget}
+        given = {name: value for name, value in given.items() if value is not None}
+        if len(given) == 2:
+            raise ValueError("--iterations and --time-budget exclude each other")
+        if given and self.policy != "clrrt":
+            raise ValueError("--iterations and --time-budget are options of --policy clrrt")
+        source = find_policy(self.policy)
+        if given and isinstance(source.factory, str):
+            source = replace(source, factory=functools.partial(load_factory(source.factory), **given))
+        return source

@@ -5,26 +5,27 @@ import sys
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 import tyro
-from gymnasium.error import DependencyNotInstalled
 
-from hydrone_gym.cli.compiling import announce_compiling, kernels_of
 from hydrone_gym.cli.missions import MissionOptions
 from hydrone_gym.evaluation.flight import Flight, fly
-from hydrone_gym.evaluation.policies import find_policy, known_policies
+from hydrone_gym.evaluation.plan import plan_of
+from hydrone_gym.evaluation.policies import Policy, PolicySource, find_policy, known_policies
 from hydrone_gym.evaluation.records import Record, record_of
-from hydrone_gym.evaluation.replays import fly_again, place_of, plan_of, same_flight
+from hydrone_gym.evaluation.run_folder import read_stored
 from hydrone_gym.evaluation.saved import SavedFlight, read_flights, restore
-from hydrone_gym.evaluation.stored import read_stored
+from hydrone_gym.evaluation.shown import fly_record
 from hydrone_gym.rendering.replay import load_viser, write_replay
+from hydrone_gym.rendering.stage import Tree
 from hydrone_gym.simulation.simulation import Simulation
-from planners import TreeRecorder, TreeView
 
+RECORDERS = "hydrone_gym.recorders"  # entry points: "trees" wraps a policy and keeps its trees as `trees`
 _OF_FILES, _OF_EVALUATIONS = {"flight"}, {"suite", "mission", "world"}
 _OF_PAGES = {"saved", "out", "open", "json"}
 
@@ -36,7 +37,7 @@ class Take(NamedTuple):
     title: str
     flight: Flight
     simulation: Simulation
-    trees: Sequence[TreeView]
+    trees: Sequence[Tree]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,13 +63,9 @@ class Replay(MissionOptions):
 
     def run(self) -> int:
         """Fly, write the pages and return the exit code."""
-        try:
-            load_viser()
-            takes = self._takes()
-            pages = self._write(takes)
-        except (ValueError, OSError, DependencyNotInstalled) as error:
-            print(f"hydrone: error: {error}", file=sys.stderr)
-            return 2
+        load_viser()
+        takes = self._takes()
+        pages = self._write(takes)
         if self.json:
             shown = [_described(take, page) for take, page in zip(takes, pages, strict=True)]
             print(json.dumps({"format": "hydrone_gym replays", "version": 1, "replays": shown}, indent=1))
@@ -95,7 +92,7 @@ class Replay(MissionOptions):
         if not chosen:
             names = ", ".join(saved.name for saved in flights)
             raise ValueError(f"--flight must be one of {names}, got {self.flight!r}")
-        return [_replayed(saved) for saved in chosen]
+        return [_restored(saved) for saved in chosen]
 
     def _refuse(self, names: set[str], source: str) -> None:
         """Raise ValueError if one of these options was given another value than its default."""
@@ -108,11 +105,10 @@ class Replay(MissionOptions):
     def _fresh(self) -> list[Take]:
         """Fly the missions of the options."""
         takes = []
-        for mission in self.missions():
-            recorder = TreeRecorder(mission.policy)
+        for mission in self.prepare():
+            recorder = tree_recorder(mission.policy)
             flight = fly(mission.env, recorder, seed=self.seed, scenario=mission.scenario)
-            title = f"{_spoken(mission.name)}, {self.policy}, seed {self.seed}"
-            takes.append(Take(mission.name, title, flight, mission.env.get_wrapper_attr("simulation"), recorder.trees))
+            takes.append(_take(mission.name, self.policy, self.seed, mission.env, flight, recorder.trees))
         return takes
 
     def _evaluated(self, folder: Path) -> Take:
@@ -120,18 +116,17 @@ class Replay(MissionOptions):
         stored = read_stored(folder)
         record, plan = self._row(stored.records), plan_of(stored.arguments)
         source = next(source for source in plan.policies if source.label == record.policy)
-        announce_compiling(*kernels_of(source))
-        recorders: list[TreeRecorder] = []
+        recorders: list[Any] = []
 
-        def recorded(env: gym.Env, seed: int) -> TreeRecorder:
-            recorders.append(TreeRecorder(source.make(env, seed)))
+        def recorded(env: gym.Env, seed: int) -> Any:
+            recorders.append(tree_recorder(source.make(env, seed)))
             return recorders[-1]
 
-        plan = replace(plan, policies=(replace(source, factory=recorded, folder=""),))
-        flight, simulation = fly_again(record, plan)
-        if not same_flight(record, record_of(record.key, flight)):
+        plan = replace(plan, policies=(PolicySource(label=source.label, factory=recorded),))
+        flight, simulation = fly_record(record, plan)
+        if not record.same_flight(record_of(record.key, flight)):
             print("hydrone: this flight differs from its row: code or clock led elsewhere", file=sys.stderr)
-        title = f"{record.policy}: {place_of(record)}"
+        title = f"{record.policy}: {record.place}"
         return Take(f"{record.policy}-{record.mission}-{record.world}", title, flight, simulation, recorders[-1].trees)
 
     def _row(self, records: Sequence[Record]) -> Record:
@@ -156,31 +151,32 @@ class Replay(MissionOptions):
         return pages
 
 
-def _replayed(saved: SavedFlight) -> Take:
-    """Fly a saved flight again from its references, and its planner for the trees."""
+def _restored(saved: SavedFlight) -> Take:
+    """Fly a saved flight again from its references, and its planner for the trees.
+
+    There are none where the policy is not a registered one or flies otherwise now.
+    """
     env = gym.make("HydroneGym/Mission-v0", num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
-    simulation = env.get_wrapper_attr("simulation")
-    flight = restore(saved, simulation)
-    title = f"{_spoken(saved.name)}, {saved.policy}, seed {saved.seed}"
-    return Take(saved.name, title, flight, simulation, _trees(saved, env))
+    flight, trees = restore(saved, env.get_wrapper_attr("simulation")), ()
+    if saved.policy in known_policies():
+        recorder = tree_recorder(find_policy(saved.policy).make(env, saved.seed))
+        again = fly(env, recorder, seed=saved.seed, scenario=saved.scenario)
+        if np.array_equal(again.states, saved.states):
+            trees = recorder.trees
+        else:
+            print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
+    return _take(saved.name, saved.policy, saved.seed, env, flight, trees)
 
 
-def _trees(saved: SavedFlight, env: gym.Env) -> Sequence[TreeView]:
-    """Return the trees of a saved flight, none where its policy is not a registered one or flies otherwise now."""
-    if saved.policy not in known_policies():
-        return ()
-    source = find_policy(saved.policy)
-    announce_compiling(*kernels_of(source))
-    recorder = TreeRecorder(source.make(env, saved.seed))
-    flight = fly(env, recorder, seed=saved.seed, scenario=saved.scenario)
-    if np.array_equal(flight.states, saved.states):
-        return recorder.trees
-    print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
-    return ()
+def tree_recorder(policy: Policy) -> Any:
+    """Wrap a policy so that its trees are kept, as `trees`: by what a package has registered for it."""
+    (recorder,) = entry_points(group=RECORDERS, name="trees")
+    return recorder.load()(policy)
 
 
-def _spoken(name: str) -> str:
-    return name[:1].upper() + name[1:].replace("-", " ")
+def _take(name: str, policy: str, seed: int, env: gym.Env, flight: Flight, trees: Sequence[Tree]) -> Take:
+    title = f"{name[:1].upper()}{name[1:].replace('-', ' ')}, {policy}, seed {seed}"
+    return Take(name, title, flight, env.get_wrapper_attr("simulation"), trees)
 
 
 def _described(take: Take, page: Path) -> dict[str, Any]:

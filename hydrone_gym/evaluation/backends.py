@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
 Runner = Callable[[Iterable[Any]], Generator[Any, None, None]]
+MOST_JOBS = 1024
 _PORTION = 16  # calls a worker
 _IDLE = 20  # s after which a worker without work ends: also one whose parent was killed
 
@@ -29,12 +30,12 @@ def runner(backend: str | None, jobs: int | None) -> Iterator[Runner]:
     (DASK_SCHEDULER_ADDRESS), else a local one. Ray joins RAY_ADDRESS or starts locally.
 
     Raises:
-        ValueError: a backend that joblib does not know or that lacks its package, or a number of jobs below 1.
+        ValueError: a backend that joblib does not know or that lacks its package, or a number of jobs out of range.
     """
     import joblib
 
-    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
-        raise ValueError(f"jobs must be a whole number of at least 1, got {jobs!r}")
+    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= MOST_JOBS):
+        raise ValueError(f"jobs must be a whole number of at least 1, at most {MOST_JOBS}, got {jobs!r}")
     with contextlib.ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         # work under way when an evaluation stops is flown again when it goes on

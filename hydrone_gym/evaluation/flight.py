@@ -1,6 +1,7 @@
-"""One flight: a policy flies an environment to its end, and everything worth knowing about it is kept."""
+"""Flying: a policy flies one world and everything worth knowing is kept, or many worlds in a batch."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -9,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.envs.hydrone_env import HydroneEnv
-from hydrone_gym.evaluation.policy import Policy
+from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import row_at, trajectory
 from hydrone_gym.world.scenario import Scenario
+
+_TOLD = ("outcome", "time", "energy", "clearance", "transitions")  # by the last `info` of an episode
 
 
 class Trace(NamedTuple):
@@ -24,42 +27,32 @@ class Trace(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Flight:
-    """A flown episode.
+class Ending:
+    """How an episode ended and what it took."""
 
-    Attributes:
-        scenario: what was flown.
-        outcome: how it ended.
-        time: s.
-        energy: of the rotors' shafts, J.
-        clearance: least distance of the vehicle's sphere to an obstacle, m; infinite without obstacles.
-        transitions: a dict for each crossing: time (s), direction, lateral_speed (m/s), tilt (rad),
-            vertical_speed (m/s).
-        length: of the path, summed over ticks, m.
-        episode_return: sum of rewards.
-        references: (K, 4) those in force at the end of each period, the action after clipping: m, m, m, rad.
-        states: (K + 1, 12) at the start and after each period, as in the observation.
-        detected: (k, 4) spheres x, y, z, r in m, in order of detection.
-        decision_ms: (K,) wall-clock time of each decision, ms.
-        interventions: periods in which a shield flew another reference than proposed; None for a policy whose memory
-            does not count them.
-        trace: the same flight every tick.
-    """
-
-    scenario: Scenario
-    outcome: Outcome
-    time: float
-    energy: float
-    clearance: float
+    obstacles: int  #: spheres in its world
+    outcome: Outcome  #: how it ended
+    time: float  #: s
+    energy: float  #: of the rotors' shafts, J
+    clearance: float  #: least distance of the vehicle's sphere to an obstacle, m; infinite without obstacles
+    #: of the surface: time (s), direction, lateral_speed (m/s), tilt (rad), vertical_speed (m/s)
     transitions: list[dict[str, Any]]
+    length: float | None  #: of the path, summed over ticks, m; None in a batch, which does not keep them
+    episode_return: float  #: sum of rewards
+    decision_ms: NDArray[np.float64]  #: (K,) wall-clock time of each decision, ms; in a batch its share
+    interventions: int | None  #: periods in which a shield flew another reference; None where nothing counts them
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flight(Ending):
+    """A flown episode."""
+
     length: float
-    episode_return: float
-    references: NDArray[np.float64]
-    states: NDArray[np.float64]
-    detected: NDArray[np.float64]
-    decision_ms: NDArray[np.float64]
-    interventions: int | None
-    trace: Trace
+    scenario: Scenario  #: what was flown
+    references: NDArray[np.float64]  #: (K, 4) in force at the end of each period, actions clipped: m, m, m, rad
+    states: NDArray[np.float64]  #: (K + 1, 12) at the start and after each period, as in the observation
+    detected: NDArray[np.float64]  #: (k, 4) spheres x, y, z, r in m, in order of detection
+    trace: Trace  #: the same flight every tick
 
     @property
     def undetected(self) -> NDArray[np.float64]:
@@ -95,25 +88,77 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         references.append(observation["reference"])
         rewards.append(float(reward))
         start, done = np.array([False]), terminated or truncated
-    sent = np.array(references)
-    trace = _trace(world, states[0], sent)
-    interventions = getattr(memory, "interventions", None)
+    trace = _trace(world, states[0], np.array(references))
     return Flight(
+        obstacles=len(world.scenario.obstacles),
         scenario=world.scenario,
-        outcome=info["outcome"],
-        time=info["time"],
-        energy=info["energy"],
-        clearance=info["clearance"],
-        transitions=info["transitions"],
+        **{key: info[key] for key in _TOLD},
         length=float(np.linalg.norm(np.diff(trace.states[:, :3], axis=0), axis=1).sum()),
         episode_return=sum(rewards),
-        references=sent,
+        references=np.array(references),
         states=np.array(states),
         detected=observation["obstacles"][observation["obstacles"][:, 3] > 0.0],
         decision_ms=np.array(decisions),
-        interventions=None if interventions is None else int(np.sum(interventions)),
+        interventions=_interventions(memory),
         trace=trace,
     )
+
+
+def fly_worlds(
+    env: gym.vector.VectorEnv, policy: Policy, *, seed: int | None = None, scenarios: Sequence[Scenario] | None = None
+) -> list[Ending]:
+    """Fly a policy once in each row of a vector of environments, deterministically, all at once.
+
+    Args:
+        env: from `gym.make_vec(id, n, vectorization_mode="vector_entry_point")`, `interface="world"`.
+        policy: chooses the references of all rows that still fly; its memory is new.
+        seed: row i flies the world that a single environment draws from ``seed + i``.
+        scenarios: what to fly, one a row, None for drawn worlds.
+
+    Returns:
+        How the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
+    """
+    observation, _ = env.reset(seed=seed, options=None if scenarios is None else {"scenario": list(scenarios)})
+    running, memory, starts = np.arange(env.num_envs), None, np.ones(env.num_envs, bool)
+    returns, shares, endings = np.zeros(env.num_envs), [], {}
+    while len(running):
+        # rows fly on after their first episode; what they do then does not count, so the policy is spared it
+        seen = {key: value[running] for key, value in observation.items()}
+        actions, began = observation["reference"].astype(np.float32), time.perf_counter()
+        actions[running], memory = policy.predict(seen, state=memory, episode_start=starts, deterministic=True)
+        shares.append(1e3 * (time.perf_counter() - began) / len(running))
+        observation, rewards, _, _, info = env.step(actions)
+        returns[running] += rewards[running]
+        over = info["outcome"][running] != Outcome.RUNNING
+        for k in np.flatnonzero(over):
+            row = running[k]
+            told = {key: info[key][row] for key in _TOLD}
+            endings[row] = Ending(
+                **{**told, "outcome": Outcome(told["outcome"])},
+                obstacles=observation["obstacles"].shape[1] if scenarios is None else len(scenarios[row].obstacles),
+                length=None,
+                episode_return=float(returns[row]),
+                decision_ms=np.array(shares),
+                interventions=_interventions(memory, int(k)),
+            )
+        on = np.flatnonzero(~over)
+        running, memory, starts = running[on], _rows_of(memory, on), np.zeros(len(on), bool)
+    return [endings[row] for row in range(env.num_envs)]
+
+
+def _interventions(memory: Any, row: int = 0) -> int | None:
+    """Return how often a shield intervened in the episode of a row; None for a memory that does not count it."""
+    counted = getattr(memory, "interventions", None)
+    return None if counted is None else int(np.atleast_1d(counted)[row])
+
+
+def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
+    """Pick rows out of a policy's memory: arrays, sequences with an entry a row, and named tuples of such things."""
+    if memory is None:
+        return None
+    if hasattr(memory, "_fields"):
+        return type(memory)(*(_rows_of(part, rows) for part in memory))
+    return memory[rows] if isinstance(memory, np.ndarray) else tuple(memory[row] for row in rows)
 
 
 def _world_env(env: gym.Env) -> HydroneEnv:

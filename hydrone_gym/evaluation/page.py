@@ -13,22 +13,12 @@ from pathlib import Path
 from urllib.parse import quote
 
 from hydrone_gym.evaluation.page_figures import SEVERAL, Chart, charts_of
-from hydrone_gym.evaluation.plan import Plan
+from hydrone_gym.evaluation.plan import Plan, plan_of
 from hydrone_gym.evaluation.records import Record
-from hydrone_gym.evaluation.replays import (
-    REPLAYS,
-    Shown,
-    Writer,
-    place_of,
-    plan_of,
-    same_flight,
-    shown_flights,
-    write_replays,
-)
-from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, write_whole
-from hydrone_gym.evaluation.stored import Stored, read_stored
+from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
+from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary
-from hydrone_gym.evaluation.tables import Table
+from hydrone_gym.evaluation.tables import tables_of
 from hydrone_gym.rendering.comparison import colour
 
 PAGE = "report.html"
@@ -134,18 +124,19 @@ def _worlds(suite: str, missions: Mapping[str, int]) -> str:
 
 def _suite_tables(stored: Stored, suite: str) -> str:
     """Return the tables of a suite: all missions together, then each, folded where they are many."""
-    within = [pair for pair in zip(stored.summaries, stored.tables, strict=True) if pair[0].suite == suite]
-    whole = [_tables(stored, *pair) for pair in within if pair[0].mission == ALL_MISSIONS]
-    each = [_tables(stored, *pair) for pair in within if pair[0].mission != ALL_MISSIONS]
+    within = [summary for summary in stored.summaries if summary.suite == suite]
+    whole = [_tables(stored, summary) for summary in within if summary.mission == ALL_MISSIONS]
+    each = [_tables(stored, summary) for summary in within if summary.mission != ALL_MISSIONS]
     if len(each) > _UNFOLDED:
         each = [_folded(f"Tables of each of the {len(each)} missions", _lines(each))]
     return f"<h3>{escape(suite)}</h3>\n{_lines([*whole, *each])}"
 
 
-def _tables(stored: Stored, summary: MissionSummary, tables: Sequence[Table]) -> str:
+def _tables(stored: Stored, summary: MissionSummary) -> str:
     """Return the tables of a mission."""
     ranked, compared = [p.policy for p in summary.policies], [c.policy for c in summary.comparisons]
     shown = []
+    tables = tables_of([summary])
     for table, policies in zip(tables, (ranked, ranked, compared), strict=False):  # as `tables_of` orders them
         rows = [
             f"<tr>{_named(stored, policy, first)}{''.join(f'<td>{_figure(cell)}</td>' for cell in cells)}</tr>"
@@ -201,11 +192,11 @@ def _replays(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Pat
 def _flight(record: Record, flown: tuple[Path, Record] | None, folder: Path) -> str:
     """Return a cell: how a flight ended, linked to its replay, and where it was."""
     ending = escape(_ending(record))
-    place = f"<br><small>{escape(place_of(record))}</small>"
+    place = f"<br><small>{escape(record.place)}</small>"
     if flown is None:
         return ending + place
     path, again = flown
-    differs = "" if same_flight(record, again) else f"<br><small>flown again: {escape(_ending(again))}</small>"
+    differs = "" if record.same_flight(again) else f"<br><small>flown again: {escape(_ending(again))}</small>"
     return _link(path.relative_to(folder).as_posix(), _ending(record)) + place + differs
 
 

@@ -1,56 +1,103 @@
-"""The plan of an evaluation: which flights, in which order, checked before the first of them."""
+"""The plan of an evaluation: which flights, in which order, and the jobs they are flown in.
 
+A job is one policy in a few worlds of a mission. Plain data go in and records come out, so that it can run in this
+process or in any other.
+"""
+
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from hydrone_gym.evaluation.jobs import Job, make_env, warm_up
-from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory, PolicySource, find_policies
+import gymnasium as gym
+import numpy as np
+
+import hydrone_gym  # noqa: F401  (registers the ids, also in a worker process)
+from hydrone_gym.evaluation.flight import fly, fly_worlds
+from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory, PolicySource, find_policies, told
 from hydrone_gym.evaluation.provenance import sources
-from hydrone_gym.evaluation.records import Key
-from hydrone_gym.evaluation.suites import Suite, load_suite
+from hydrone_gym.evaluation.records import Key, Record, record_of
+from hydrone_gym.evaluation.suites import Mission, Suite, load_suite
 from hydrone_gym.vehicle import named_vehicle
+from hydrone_gym.world.scenario import Scenario
 
 WORLDS_A_JOB = 5  # enough that sending a job costs little, few enough that little is lost when one is cut short
+WORLDS_A_BATCH = 1000
 
 SuiteLike = str | Path | Suite
 PoliciesLike = str | Iterable[str] | Mapping[str, str | Factory]
 
 
+class BrokenOff(NamedTuple):
+    """A flight that could not be flown to its end because its policy raised."""
+
+    key: Key  # of the record it would have been
+    reason: str  # the error in one line, with the place in the policy it came from
+    details: str  # the whole traceback
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """What one call of `fly_job` flies."""
+
+    policy: PolicySource  # what flies
+    seed: int  # for policies that draw
+    env_id: str  # registered id of the environment
+    options: Mapping[str, Any]
+    suite: str  # name for the records, as the next
+    mission: str
+    worlds: tuple[tuple[int, Scenario], ...]  # number and scenario of each world
+    batch: bool  # whether to fly them all at once
+
+    @property
+    def keys(self) -> list[Key]:
+        """The keys of its records, in order."""
+        return [(self.suite, self.mission, world, self.policy.label) for world, _ in self.worlds]
+
+    def make_env(self) -> gym.Env:
+        """Make its environment."""
+        return gym.make(self.env_id, disable_env_checker=True, **self.options)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What an evaluation flies; build it with `make_plan`.
+    """What an evaluation flies; build it with `make_plan`."""
 
-    Attributes:
-        suites: with no more worlds than are flown.
-        policies: what flies them.
-        seed: given to policies that draw.
-        vehicle: "paper" or "physical".
-    """
-
-    suites: tuple[Suite, ...]
-    policies: tuple[PolicySource, ...]
-    seed: int
-    vehicle: str
+    suites: tuple[Suite, ...]  # with no more worlds than are flown
+    policies: tuple[PolicySource, ...]  # what flies them
+    seed: int  # given to policies that draw
+    vehicle: str  # "paper" or "physical"
 
     def jobs(self) -> Iterator[Job]:
         """Yield all jobs: policies take turns on the same few worlds, so what is done is comparable at any moment."""
         for suite in self.suites:
+            most = WORLDS_A_BATCH if suite.batch else WORLDS_A_JOB
             for mission in suite.missions:
-                options = {**mission.options, "vehicle": self.vehicle}
-                numbered = list(enumerate(mission.scenarios))
-                for first in range(0, len(numbered), WORLDS_A_JOB):
-                    for policy in self.policies:
-                        yield Job(
-                            policy=policy,
-                            seed=self.seed,
-                            env_id=mission.env_id,
-                            options=options,
-                            suite=suite.name,
-                            mission=mission.name,
-                            worlds=tuple(numbered[first : first + WORLDS_A_JOB]),
-                        )
+                for first in range(0, len(mission.scenarios), most):
+                    worlds = range(first, min(first + most, len(mission.scenarios)))
+                    yield from (self.job(suite, mission, policy, worlds) for policy in self.policies)
+
+    def job(self, suite: Suite, mission: Mission, policy: PolicySource, worlds: Iterable[int]) -> Job:
+        """Return the job of a policy in some worlds of a mission."""
+        return Job(
+            policy=policy,
+            seed=self.seed,
+            env_id=mission.env_id,
+            options={**mission.options, "vehicle": self.vehicle},
+            suite=suite.name,
+            mission=mission.name,
+            worlds=tuple((world, mission.scenarios[world]) for world in worlds),
+            batch=suite.batch,
+        )
+
+    def job_of(self, record: Record) -> Job:
+        """Return the job that flies the world of a record again, alone; ValueError if the plan does not hold it."""
+        found = [(s, m) for s in self.suites for m in s.missions if (s.name, m.name) == (record.suite, record.mission)]
+        policies = [policy for policy in self.policies if policy.label == record.policy]
+        if not found or not policies or record.world >= len(found[0][1].scenarios):
+            raise ValueError(f"the plan does not hold {record.place}, policy {record.policy}")
+        return self.job(*found[0], policies[0], [record.world])
 
     def keys(self) -> list[Key]:
         """The keys of all records, in the order of the rows."""
@@ -72,17 +119,17 @@ class Plan:
 
         Raises ValueError naming the scenario that cannot be flown, or the policy that cannot be made.
         """
-        for suite in self.suites:
-            for mission in suite.missions:
-                env = make_env(mission.env_id, {**mission.options, "vehicle": self.vehicle})
-                for world, scenario in enumerate(mission.scenarios):
-                    try:
-                        env.reset(options={"scenario": scenario})
-                    except ValueError as error:
-                        named = f"suite {suite.name}, mission {mission.name}, world {world} {scenario.name}".strip()
-                        raise ValueError(f"{named}: {error}") from None
-        for job, _ in zip(self.jobs(), self.policies):  # the first job of each policy
-            env = make_env(job.env_id, job.options)
+        jobs = list(self.jobs())
+        for job in jobs[:: len(self.policies)]:
+            env = job.make_env()
+            for world, scenario in job.worlds:
+                try:
+                    env.reset(options={"scenario": scenario})
+                except ValueError as error:
+                    place = f"suite {job.suite}, mission {job.mission}, world {world} {scenario.name}".strip()
+                    raise ValueError(f"{place}: {error}") from None
+        for job in jobs[: len(self.policies)]:
+            env = job.make_env()
             job.policy.make(env, job.seed)
             warm_up(job, env)
 
@@ -106,9 +153,70 @@ def make_plan(
             raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
     named_vehicle(vehicle)
     several = [suites] if isinstance(suites, str | Path | Suite) else list(suites)
-    loaded = [suite if isinstance(suite, Suite) else load_suite(suite) for suite in several]
+    loaded = [suite if isinstance(suite, Suite) else load_suite(suite, worlds) for suite in several]
     names = [suite.name for suite in loaded]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"there must be at least one suite, and suites must have different names, got {names}")
     kept = tuple(suite if worlds is None else suite.first(worlds) for suite in loaded)
     return Plan(suites=kept, policies=find_policies(policies), seed=seed, vehicle=vehicle)
+
+
+def plan_of(arguments: Mapping[str, Any]) -> Plan:
+    """Find again what an evaluation flew, from the arguments in its summary.
+
+    Raises:
+        ValueError: a suite that is not what it was; FileNotFoundError: one that is not frozen and has no file here.
+    """
+    suites = []
+    for name, fingerprint in arguments["suites"].items():
+        worlds = max(arguments["worlds"][name].values())
+        suites.append(load_suite(name, worlds).first(worlds))
+        if suites[-1].fingerprint() != fingerprint:
+            raise ValueError(f"suite {name}: its worlds are not those that were flown; give the plan of the evaluation")
+    policies = tuple(PolicySource.of_origin(label, origin) for label, origin in arguments["policies"].items())
+    return Plan(suites=tuple(suites), policies=policies, seed=arguments["seed"], vehicle=arguments["vehicle"])
+
+
+def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:
+    """Fly the worlds of a job; stop at the first whose policy raises, and say so beside the records before it.
+
+    Unless they are flown in a batch, every flight has a policy of its own, fresh from the factory, so a record depends
+    on policy, seed and world alone, not on what else was flown in the same process.
+    """
+    env, records = job.make_env(), list[Record]()
+    warm_up(job, env)
+    try:
+        if job.batch:
+            return _fly_batch(job, env), None
+        for key, (_, scenario) in zip(job.keys, job.worlds, strict=True):
+            records.append(record_of(key, fly(env, job.policy.make(env, job.seed), scenario=scenario)))
+    except Exception as error:  # whatever a user's policy may raise
+        return records, BrokenOff(job.keys[len(records)], told(error), traceback.format_exc())
+    return records, None
+
+
+def _fly_batch(job: Job, env: gym.Env) -> list[Record]:
+    rows = gym.make_vec(job.env_id, num_envs=len(job.worlds), vectorization_mode="vector_entry_point", **job.options)
+    endings = fly_worlds(rows, job.policy.make(env, job.seed), scenarios=[scenario for _, scenario in job.worlds])
+    return [record_of(key, ending) for key, ending in zip(job.keys, endings, strict=True)]
+
+
+_warm: set[tuple[str, str]] = set()  # label and origin of the policies that have decided in this process
+
+
+def warm_up(job: Job, env: gym.Env) -> None:
+    """Let a policy decide once in this process before it is timed, which compiles its kernels or loads them.
+
+    What it raises then it will raise again in the flight.
+    """
+    name = (job.policy.label, job.policy.origin)
+    if name in _warm:
+        return
+    _warm.add(name)
+    observation, _ = env.reset(options={"scenario": job.worlds[0][1]})
+    try:
+        policy = job.policy.make(env, job.seed)
+        action, _ = policy.predict(observation, state=None, episode_start=np.array([True]), deterministic=True)
+        env.step(action)
+    except Exception:
+        return

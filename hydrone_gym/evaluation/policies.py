@@ -2,7 +2,8 @@
 
 A factory takes the environment and returns a policy for it; one that also takes `seed` is given that of the
 evaluation. Packages register factories under the entry points `hydrone_gym.policies`, and readers of folders of trained
-agents, (folder, environment) -> policy, under `hydrone_gym.policy_folders`, by the name of a file in such a folder.
+agents, (folder, environment) -> policy, under `hydrone_gym.policy_folders`, by the name of a file in such a folder, and
+what can be put around a policy, (policy, environment) -> policy, under `hydrone_gym.policy_wrappers`.
 """
 
 import importlib
@@ -13,13 +14,14 @@ import sys
 import traceback
 import zlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from hydrone_gym.evaluation.policy import Policy
+import numpy as np
+from numpy.typing import NDArray
 
 DEFAULT_POLICIES = (
     "straight-line",
@@ -31,26 +33,47 @@ DEFAULT_POLICIES = (
     "ppo-shield",
     "sac",
 )
-Factory = Callable[..., Policy]
-_NAMES, _FOLDERS = "hydrone_gym.policies", "hydrone_gym.policy_folders"
+_NAMES, _FOLDERS, _WRAPPERS = "hydrone_gym.policies", "hydrone_gym.policy_folders", "hydrone_gym.policy_wrappers"
+_BEHIND = " behind "
 _LABEL = re.compile(r"[\w.+-]+")
+
+
+class Policy(Protocol):
+    """Anything that chooses references: a planner, an agent, or a Stable-Baselines3 model as it is."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray, Any]:
+        """Return actions for one observation or a batch, and the policy's memory.
+
+        Args:
+            observation: what the environment returned, single or batched along the first axis.
+            state: what the last call returned, None at the start.
+            episode_start: (n,) True where an episode begins, which resets that memory.
+            deterministic: take the best action instead of drawing one.
+
+        Returns:
+            Actions (4,) or (n, 4) in m, m, m, rad, and the new state.
+        """
+        ...
+
+
+Factory = Callable[..., Policy]
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicySource:
-    """What a policy is made from; plain data that can be sent to another process.
+    """What a policy is made from; plain data that can be sent to another process."""
 
-    Attributes:
-        label: what tables call it.
-        factory: "module:attribute", "/path/file.py:attribute", or the factory itself.
-        search: folder that modules are imported from besides those installed; empty for none.
-        folder: of a trained agent, handed to the factory before the environment; empty for none.
-    """
-
-    label: str
-    factory: str | Factory
-    search: str = ""
-    folder: str = ""
+    label: str  # what tables call it
+    factory: str | Factory  # "module:attribute", "/path/file.py:attribute", or the factory itself
+    search: str = ""  # folder that modules are imported from besides those installed; empty for none
+    folder: str = ""  # of a trained agent, handed to the factory before the environment; empty for none
+    wrapper: str = ""  # "module:attribute" of what is put around the policy; empty for nothing
 
     def make(self, env: Any, seed: int) -> Policy:
         """Return a new policy for an environment.
@@ -61,6 +84,7 @@ class PolicySource:
             factory = load_factory(self.factory, self.search) if isinstance(self.factory, str) else self.factory
             arguments = (self.folder, env) if self.folder else (env,)
             policy = factory(*arguments, seed=seed) if _takes_seed(factory) else factory(*arguments)
+            policy = load_factory(self.wrapper)(policy, env) if self.wrapper else policy
         except Exception as error:
             raise ValueError(f"policy {self.label!r} cannot be made: {told(error)}") from error
         if not callable(getattr(policy, "predict", None)):
@@ -74,7 +98,14 @@ class PolicySource:
         factory = self.factory
         if not isinstance(factory, str):
             factory = f"{getattr(factory, '__module__', '?')}:{getattr(factory, '__qualname__', repr(factory))}"
-        return f"{factory} {self.folder}".strip()
+        return f"{factory} {self.folder}".strip() + f"{_BEHIND}{self.wrapper}" * bool(self.wrapper)
+
+    @classmethod
+    def of_origin(cls, label: str, origin: str) -> "PolicySource":
+        """Find a source again; modules are sought in the current folder too."""
+        made, _, wrapper = origin.partition(_BEHIND)
+        factory, _, folder = made.partition(" ")
+        return cls(label=label, factory=factory, search=str(Path.cwd()), folder=folder, wrapper=wrapper)
 
 
 def known_policies() -> list[str]:
@@ -87,7 +118,8 @@ def find_policy(text: str) -> PolicySource:
 
     Args:
         text: a registered name, "module:attribute", "path/file.py:attribute", or the folder of a trained agent, each
-            also as "LABEL=…" to call it otherwise. Modules are sought in the current folder too.
+            also as "LABEL=…" to call it otherwise, and as "…+shield" to put the shield, or another registered wrapper,
+            around it. Modules are sought in the current folder too.
 
     Raises:
         ValueError: a name that is not registered, or a module or attribute that cannot be loaded; the message says why.
@@ -95,6 +127,10 @@ def find_policy(text: str) -> PolicySource:
     """
     before, _, after = text.partition("=")
     label, given = (before, after) if after and _LABEL.fullmatch(before) else (text, text)
+    inner, plus, name = given.rpartition("+")
+    wrappers = [entry for entry in entry_points(group=_WRAPPERS) if plus and entry.name == name]
+    if wrappers:
+        return replace(find_policy(inner), label=label, wrapper=_only(wrappers))
     registered = [entry for entry in entry_points(group=_NAMES) if entry.name == given]
     if registered:
         return PolicySource(label=label, factory=_only(registered))
@@ -198,8 +234,12 @@ def _module_of(file: Path) -> Any:
 
 
 def _takes_seed(factory: Factory) -> bool:
+    """Tell whether a factory takes a seed, or hands it on as a method of a class that takes one."""
+    owner: Any = getattr(getattr(factory, "func", factory), "__self__", None)  # `func` of a functools.partial
     try:
-        return "seed" in inspect.signature(factory).parameters
+        options = inspect.signature(factory).parameters
+        hands_on = isinstance(owner, type) and any(o.kind is o.VAR_KEYWORD for o in options.values())
+        return "seed" in options or (hands_on and "seed" in inspect.signature(owner).parameters)
     except ValueError:  # some built-in callables have no signature
         return False
 

@@ -4,11 +4,12 @@ import csv
 import io
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from hydrone_gym.evaluation.flight import Flight
+from hydrone_gym.evaluation.flight import Ending
 from hydrone_gym.evaluation.statistics import percentiles
 from hydrone_gym.simulation.outcome import Outcome
 
@@ -17,52 +18,28 @@ Key = tuple[str, str, int, str]
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """One flight; None is an empty cell, where there is nothing to tell.
+    """One flight; None is an empty cell, where there is nothing to tell."""
 
-    Attributes:
-        suite: name of the suite, with its version.
-        mission: name of the mission in it.
-        world: number of the world in the mission, from 0.
-        obstacles: spheres in that world.
-        policy: what the evaluation calls it.
-        outcome: name of an `Outcome`.
-        success: whether that is GOAL.
-        time: s.
-        energy: of the rotors' shafts, J.
-        length: of the path, m.
-        clearance: least distance of the vehicle's sphere to an obstacle, m; None without obstacles.
-        crossings: of the surface.
-        crossing_time: of the first one, s.
-        lateral_speed: largest at a crossing, m/s.
-        tilt: largest at a crossing, rad.
-        vertical_speed: largest at a crossing, either way, m/s.
-        interventions: periods in which a shield flew another reference; None without a shield.
-        episode_return: sum of rewards.
-        decisions: periods flown.
-        decision_ms_p50, decision_ms_p99, decision_ms_max: wall-clock time of a decision, ms. Only these differ from run
-            to run.
-    """
-
-    suite: str
-    mission: str
-    world: int
-    obstacles: int
-    policy: str
-    outcome: str
-    success: bool
-    time: float
-    energy: float
-    length: float
-    clearance: float | None
-    crossings: int
-    crossing_time: float | None
-    lateral_speed: float | None
-    tilt: float | None
-    vertical_speed: float | None
-    interventions: int | None
-    episode_return: float
-    decisions: int
-    decision_ms_p50: float
+    suite: str  #: name of the suite, with its version
+    mission: str  #: name of the mission in it
+    world: int  #: number of the world in the mission, from 0
+    obstacles: int  #: spheres in that world
+    policy: str  #: what the evaluation calls it
+    outcome: str  #: name of an `Outcome`
+    success: bool  #: whether that is GOAL
+    time: float  #: s
+    energy: float  #: of the rotors' shafts, J
+    length: float | None  #: of the path, m; None for a flight in a batch
+    clearance: float | None  #: least distance of the vehicle's sphere to an obstacle, m; None without obstacles
+    crossings: int  #: of the surface
+    crossing_time: float | None  #: of the first one, s
+    lateral_speed: float | None  #: largest at a crossing, m/s
+    tilt: float | None  #: largest at a crossing, rad
+    vertical_speed: float | None  #: largest at a crossing, either way, m/s
+    interventions: int | None  #: periods in which a shield flew another reference; None without a shield
+    episode_return: float  #: sum of rewards
+    decisions: int  #: periods flown
+    decision_ms_p50: float  #: wall-clock time of a decision, ms; only these three differ from run to run
     decision_ms_p99: float
     decision_ms_max: float
 
@@ -71,27 +48,36 @@ class Record:
         """What tells it from every other record: suite, mission, world, policy."""
         return self.suite, self.mission, self.world, self.policy
 
+    @property
+    def place(self) -> str:
+        """Its world, in words."""
+        return f"{self.suite}, {self.mission}, world {self.world}"
+
+    def same_flight(self, other: "Record") -> bool:
+        """Tell whether another record differs in nothing but times of decisions."""
+        return all(getattr(self, name) == getattr(other, name) for name in COLUMNS if name not in TIMING)
+
 
 COLUMNS = tuple(field.name for field in fields(Record))
 TIMING = tuple(name for name in COLUMNS if name.startswith("decision_ms"))
 HEADER = ",".join(COLUMNS)
 
 
-def record_of(key: Key, flight: Flight) -> Record:
+def record_of(key: Key, flight: Ending) -> Record:
     """Sum up a flight."""
-    suite, mission, world, policy = key
     crossings = flight.transitions
-    p50, p99, most = percentiles(flight.decision_ms, (50.0, 99.0, 100.0))
-
-    def largest(name: str) -> float | None:
-        return max((abs(float(crossing[name])) for crossing in crossings), default=None)
-
+    speeds = ("lateral_speed", "tilt", "vertical_speed")
+    largest: dict[str, Any] = {
+        name: max((abs(float(crossing[name])) for crossing in crossings), default=None) for name in speeds
+    }
+    decisions: list[Any] = [value or 0.0 for value in percentiles(flight.decision_ms, (50.0, 99.0, 100.0))]
+    suite, mission, world, policy = key
     return Record(
         suite=suite,
         mission=mission,
         world=world,
-        obstacles=len(flight.scenario.obstacles),
         policy=policy,
+        obstacles=flight.obstacles,
         outcome=flight.outcome.name,
         success=flight.outcome is Outcome.GOAL,
         time=float(flight.time),
@@ -100,15 +86,11 @@ def record_of(key: Key, flight: Flight) -> Record:
         clearance=float(flight.clearance) if math.isfinite(flight.clearance) else None,
         crossings=len(crossings),
         crossing_time=float(crossings[0]["time"]) if crossings else None,
-        lateral_speed=largest("lateral_speed"),
-        tilt=largest("tilt"),
-        vertical_speed=largest("vertical_speed"),
+        **largest,
         interventions=flight.interventions,
         episode_return=flight.episode_return,
         decisions=len(flight.decision_ms),
-        decision_ms_p50=p50 or 0.0,
-        decision_ms_p99=p99 or 0.0,
-        decision_ms_max=most or 0.0,
+        **dict(zip(TIMING, decisions, strict=True)),
     )
 
 
@@ -141,35 +123,33 @@ def from_line(line: str) -> Record:
     return Record(**values)
 
 
-def _integer(cell: str) -> int:
-    if not cell.isascii() or not cell.isdigit():
-        raise ValueError(f"must be a whole number, got {cell!r}")
-    return int(cell)
+def _number(kind: Callable[[str], Any], rule: Callable[[str], bool], words: str) -> Callable[[str], Any]:
+    """Return a reader of cells that obey a rule."""
+
+    def read(cell: str) -> Any:
+        if not rule(cell):
+            raise ValueError(f"must be {words}, got {cell!r}")
+        return kind(cell)
+
+    return read
 
 
-def _flag(cell: str) -> bool:
-    if cell not in ("0", "1"):
-        raise ValueError(f"must be 0 or 1, got {cell!r}")
-    return cell == "1"
-
-
-def _number(cell: str) -> float:
+def _finite(cell: str) -> bool:
     try:
-        value = float(cell)
+        return math.isfinite(float(cell))
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"must be a number, got {cell!r}")
-    return value
+        return False
 
 
+_WHOLE = _number(int, lambda cell: cell.isascii() and cell.isdigit(), "a whole number")
+_FLOAT = _number(float, _finite, "a number")
 _READERS: dict[Any, Any] = {
     str: str,
-    int: _integer,
-    bool: _flag,
-    float: _number,
-    int | None: lambda cell: _integer(cell) if cell else None,
-    float | None: lambda cell: _number(cell) if cell else None,
+    int: _WHOLE,
+    bool: _number("1".__eq__, lambda cell: cell in ("0", "1"), "0 or 1"),
+    float: _FLOAT,
+    int | None: lambda cell: _WHOLE(cell) if cell else None,
+    float | None: lambda cell: _FLOAT(cell) if cell else None,
 }
 
 

@@ -2,20 +2,21 @@
 
 import contextlib
 import os
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from tqdm import tqdm
+
 from hydrone_gym.evaluation.backends import runner
-from hydrone_gym.evaluation.jobs import Failure, fly_job
-from hydrone_gym.evaluation.plan import Plan, PoliciesLike, SuiteLike, make_plan
-from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
+from hydrone_gym.evaluation.plan import BrokenOff, Plan, PoliciesLike, SuiteLike, fly_job, make_plan
+from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory
 from hydrone_gym.evaluation.records import Record
-from hydrone_gym.evaluation.results import write_results
-from hydrone_gym.evaluation.run_folder import RunFolder
+from hydrone_gym.evaluation.run_folder import RunFolder, write_results
+from hydrone_gym.evaluation.suites import Suite
+from hydrone_gym.evaluation.summary import scores_of
 
 
 class EvaluationStopped(RuntimeError):
@@ -37,8 +38,6 @@ def evaluate(
     jobs: int | None = None,
     backend: str | None = None,
     out: str | os.PathLike[str] | None = None,
-    overwrite: bool = False,
-    progress: bool = False,
 ) -> list[Record]:
     """Fly policies through the same worlds and return one record a flight.
 
@@ -54,11 +53,8 @@ def evaluate(
         jobs: flights at once.
         backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
             this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
-        out: folder to write rows to as they are finished, and `summary.json` and `tables.md` at the end, ready for
-            `hydrone_gym.evaluation.page.write_report`; an evaluation with the same arguments that was stopped there
-            goes on where it was.
-        overwrite: begin anew in that folder whatever it holds.
-        progress: show a bar with the time left on stderr.
+        out: folder for rows, written as they are finished, and results, ready for `page.write_report`; an evaluation
+            with the same arguments that was stopped there goes on where it was.
 
     Raises:
         ValueError, TypeError, FileNotFoundError: an argument out of range, an unknown suite or policy, a folder with
@@ -66,12 +62,31 @@ def evaluate(
         EvaluationStopped: a policy raised in a flight, a worker died, or the disk is full. Finished rows are kept.
     """
     plan = make_plan(suites, policies, worlds=worlds, seed=seed, vehicle=vehicle)
-    folder = None if out is None else RunFolder(Path(out), plan.arguments(), overwrite=overwrite)
+    folder = None if out is None else RunFolder(Path(out), plan.arguments())
     began = time.perf_counter()
-    records = carry_out(plan, folder, jobs=jobs, backend=backend, progress=progress)
+    records = carry_out(plan, folder, jobs=jobs, backend=backend)
     if folder is not None:
         write_results(plan, records, folder.folder, seconds=time.perf_counter() - began)
     return records
+
+
+def evaluate_held_out(
+    policy: str | Factory, *, worlds: int = 1000, options: Mapping[str, Any] | None = None
+) -> tuple[list[Record], list[dict[str, Any]]]:
+    """Fly a policy through worlds of every mission that training does not see, in batches.
+
+    Args:
+        policy: as `find_policy` takes it, or a factory.
+        worlds: a mission.
+        options: keyword options of the environments, among them "vehicle" by its name.
+
+    Returns:
+        The records, and their scores (see `scores_of`).
+    """
+    others = dict(options or {})
+    vehicle = others.pop("vehicle", "paper")
+    records = evaluate(Suite.held_out(worlds, others), {"agent": policy}, worlds=worlds, vehicle=vehicle)
+    return records, scores_of(records)
 
 
 def carry_out(
@@ -82,7 +97,10 @@ def carry_out(
     backend: str | None = None,
     progress: bool = False,
 ) -> list[Record]:
-    """Fly what of a plan is not finished yet in a folder; arguments, result and errors as for `evaluate`."""
+    """Fly what of a plan is not finished yet in a folder; arguments, result and errors as for `evaluate`.
+
+    `progress` shows a bar with the time left on stderr.
+    """
     keys = plan.keys()
     records = [] if folder is None else folder.finished(keys)
     if len(records) == len(keys):
@@ -90,14 +108,19 @@ def carry_out(
     plan.check()
     with (
         runner(backend, jobs) as run,
-        _bar(len(keys), len(records), progress) as advance,
+        tqdm(total=len(keys), initial=len(records), unit="flight", disable=None if progress else True) as bar,
         contextlib.closing(run(_calls(plan, len(records)))) as results,
     ):
         while len(records) < len(keys):
-            failure = _take(results, records, folder, len(keys))
-            advance(len(records))
-            if failure is not None:
-                raise _stopped_by(failure, records, len(keys), folder)
+            broken = _take(results, records, folder, len(keys))
+            bar.update(len(records) - bar.n)
+            if broken is not None:
+                suite, mission, world, policy = broken.key
+                where = f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}"
+                kept = _kept(records, len(keys), folder)
+                stopped = EvaluationStopped(f"{where}: {broken.reason}; {kept}", records)
+                stopped.add_note(broken.details)
+                raise stopped
     return records
 
 
@@ -112,13 +135,13 @@ def _calls(plan: Plan, done: int) -> Iterator[Any]:
             yield joblib.delayed(fly_job)(replace(job, worlds=job.worlds[skipped:]))
 
 
-def _take(results: Iterator[Any], records: list[Record], folder: RunFolder | None, total: int) -> Failure | None:
+def _take(results: Iterator[Any], records: list[Record], folder: RunFolder | None, total: int) -> BrokenOff | None:
     """Add the rows of the next job to `records` and to the folder; return what cut the job short, None if nothing did.
 
     Raises EvaluationStopped when the workers or the disk fail.
     """
     try:
-        finished, failure = next(results)
+        finished, broken = next(results)
     except Exception as error:  # a backend's own: a worker killed, a cluster lost, a policy that cannot be sent
         kind = type(error).__name__
         raise EvaluationStopped(f"workers failed: {kind}: {error}; {_kept(records, total, folder)}", records) from error
@@ -128,34 +151,10 @@ def _take(results: Iterator[Any], records: list[Record], folder: RunFolder | Non
         except OSError as error:
             raise EvaluationStopped(f"{error}; {_kept(records, total, folder)}", records) from error
     records += finished
-    return failure
-
-
-def _stopped_by(failure: Failure, records: list[Record], total: int, folder: RunFolder | None) -> EvaluationStopped:
-    """Return the error that names policy, mission and world of a flight that failed."""
-    suite, mission, world, policy = failure.key
-    where = f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}"
-    stopped = EvaluationStopped(f"{where}: {failure.reason}; {_kept(records, total, folder)}", records)
-    stopped.add_note(failure.details)
-    return stopped
+    return broken
 
 
 def _kept(records: list[Record], total: int, folder: RunFolder | None) -> str:
     """Say what was finished."""
     place = "" if folder is None else f" and kept in {folder.rows}; the same evaluation goes on from there"
     return f"{len(records)} of {total} flights are finished{place}"
-
-
-@contextlib.contextmanager
-def _bar(total: int, done: int, shown: bool) -> Iterator[Callable[[int], None]]:
-    """Show a bar on stderr where that is a terminal; yields a function that takes the number of finished flights."""
-    if not shown or not sys.stderr.isatty():
-        yield lambda finished: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = ("flights", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), "left", TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total, completed=done)
-        yield lambda finished: bar.update(task, completed=finished)

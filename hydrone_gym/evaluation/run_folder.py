@@ -1,16 +1,33 @@
-"""The folder of an evaluation: what was asked for, and the finished rows, which survive whatever ends it."""
+"""The folder of an evaluation: what was asked for, the finished rows, which survive whatever ends it, and the results.
 
+| file | content |
+|---|---|
+| `run.json` | the arguments |
+| `rows.csv` | a row a flight |
+| `summary.json`, `tables.md` | what came of it |
+"""
+
+import dataclasses
 import json
 import os
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, to_line
+from hydrone_gym.evaluation.plan import Plan
+from hydrone_gym.evaluation.provenance import commit, machine, versions
+from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, read_records, to_line
+from hydrone_gym.evaluation.statistics import Estimate
+from hydrone_gym.evaluation.summary import MissionSummary, summarise
+from hydrone_gym.evaluation.tables import Table, markdown, tables_of
 
 RUN, ROWS, SUMMARY, TABLES = "run.json", "rows.csv", "summary.json", "tables.md"
 FORMAT = "hydrone_gym evaluation"
 VERSION = 1
+_PARTS = {"versions", "commit", "machine", "date", "seconds", "rows", "complete", "missions"}
+_PARTS |= {"suites", "worlds", "policies", "seed", "vehicle", "baseline"}  # these in the arguments
+_MAPPINGS = ("suites", "worlds", "policies", "versions", "machine")
 
 
 class RunFolder:
@@ -39,7 +56,7 @@ class RunFolder:
         elif self.rows.exists():
             raise ValueError(f"{folder}: holds {ROWS} without {RUN}: choose another folder, or overwrite it")
         else:
-            write_json(run, {"format": FORMAT, "version": VERSION, "arguments": arguments})
+            _write_json(run, {"format": FORMAT, "version": VERSION, "arguments": arguments})
 
     def finished(self, keys: Sequence[Key]) -> list[Record]:
         """Return the rows that are there, the first of those that `keys` name.
@@ -81,8 +98,104 @@ def _compare(run: Path, arguments: dict[str, Any]) -> None:
         raise ValueError(f"{run.parent}: holds an evaluation with other arguments ({changes}): {advice}")
 
 
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write plain data as JSON; the file appears whole or not at all."""
+def write_results(
+    plan: Plan, records: Sequence[Record], folder: Path, *, baseline: str | None = None, seconds: float | None = None
+) -> tuple[dict[str, Any], list[Table]]:
+    """Sum up the records of a plan, at least one, write `summary.json` and `tables.md`, and return what they hold.
+
+    `seconds` is the wall-clock time that this run took, s. Raises OSError for files that cannot be written, and what
+    `summarise` raises.
+    """
+    summaries = summarise(records, baseline)
+    document = {
+        "format": f"{FORMAT} summary",
+        "version": VERSION,
+        "arguments": {**plan.arguments(), "baseline": summaries[0].baseline},
+        "versions": versions(),
+        "commit": commit(),
+        "machine": machine(),
+        "date": time.strftime("%Y-%m-%d"),
+        "seconds": seconds,
+        "rows": len(records),
+        "complete": len(records) == len(plan.keys()),
+        "missions": [_plain(dataclasses.asdict(summary)) for summary in summaries],
+    }
+    tables = tables_of(summaries)
+    _write_json(folder / SUMMARY, document)
+    write_whole(folder / TABLES, markdown(tables))
+    return document, tables
+
+
+def _plain(value: Any) -> Any:
+    """Turn estimates into dicts that name their parts, however deep."""
+    if isinstance(value, Estimate):
+        return value._asdict()
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
+
+
+class Stored(NamedTuple):
+    """What an evaluation left."""
+
+    document: Mapping[str, Any]  # the summary as plain data
+    summaries: Sequence[MissionSummary]
+    records: Sequence[Record]  # the rows, at least one
+
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """What was asked for."""
+        arguments: Mapping[str, Any] = self.document["arguments"]
+        return arguments
+
+    @property
+    def policies(self) -> list[str]:
+        """The policies in the order in which they were given."""
+        return list(dict.fromkeys(record.policy for record in self.records))
+
+
+def read_stored(folder: Path) -> Stored:
+    """Read rows and summary of an evaluation, finished or not, and check them against each other.
+
+    Raises:
+        FileNotFoundError: one of them is missing.
+        ValueError: one of them is damaged, or they do not fit each other.
+    """
+    for name in (ROWS, SUMMARY):
+        if not (folder / name).is_file():
+            raise FileNotFoundError(f"{folder}: there is no {name}: a report needs the folder of an evaluation")
+    records, path = read_records(folder / ROWS), folder / SUMMARY
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        _check(document)
+        arguments = document["arguments"]
+        summed = [(m["suite"], m["mission"], *sorted(p["policy"] for p in m["policies"])) for m in document["missions"]]
+        summaries = summarise(records, arguments["baseline"]) if records else []
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"{path}: damaged: {type(error).__name__}: {error}") from None
+    found = [(m.suite, m.mission, *sorted(p.policy for p in m.policies)) for m in summaries]
+    asked = set(arguments["suites"]), set(arguments["policies"])
+    flown = {record.suite for record in records}, {record.policy for record in records}
+    if document["rows"] != len(records) or summed != found or not (flown[0] <= asked[0] and flown[1] <= asked[1]):
+        raise ValueError(f"{folder}: {SUMMARY} does not sum up {ROWS}: run the evaluation once more")
+    return Stored(document, summaries, records)
+
+
+def _check(document: Mapping[str, Any]) -> None:
+    """Raise unless a document is a summary and has all its parts."""
+    found = (document["format"], document["version"])
+    if found != (f"{FORMAT} summary", VERSION):
+        raise ValueError(f"must be a {FORMAT} summary of version {VERSION}, got {found[0]!r}, version {found[1]!r}")
+    parts = {**document["arguments"], **document}
+    missing = sorted(_PARTS - parts.keys())
+    if missing:
+        raise ValueError(f"lacks {', '.join(missing)}")
+    for name in _MAPPINGS:
+        if not isinstance(parts[name], dict):
+            raise ValueError(f"{name} must be a dict, got {type(parts[name]).__name__}")
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 

@@ -1,6 +1,8 @@
-"""Flights that were saved as numbers, read back and flown again from their references."""
+"""Flights saved as numbers: written, read back, and flown again from their references."""
 
 import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.evaluation.flight import Flight, Trace
+from hydrone_gym.evaluation.statistics import percentiles
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 from hydrone_gym.vehicle import named_vehicle
@@ -19,29 +22,56 @@ VERSION = 1
 _SAME = 1e-6  # m, rad, m/s: another processor may round otherwise, another model flies elsewhere
 
 
+def flight_record(flight: Flight) -> dict[str, Any]:
+    """Return a flight as numbers, strings, lists and dicts: SI units, angles in rad, planning times in ms.
+
+    Every number is finite; what is not, such as the clearance in a world without obstacles, is None.
+    """
+    p50, p99 = percentiles(flight.decision_ms, (50.0, 99.0))
+    record = {
+        "scenario": {name: getattr(flight.scenario, name) for name in ("name", "start", "goal", "obstacles")},
+        "outcome": flight.outcome.name,
+        "success": flight.outcome is Outcome.GOAL,
+        "time": flight.time,
+        "transitions": flight.transitions,
+        "clearance": flight.clearance,
+        "length": flight.length,
+        "energy": flight.energy,
+        "episode_return": flight.episode_return,
+        "planning_ms": {"p50": p50, "p99": p99},
+        "references": flight.references,
+        "states": flight.states,
+        "detected": flight.detected,
+    }
+    return {name: plain(value) for name, value in record.items()}
+
+
+def plain(value: Any) -> Any:
+    """Turn arrays, tuples and NumPy scalars into what JSON has, with None for numbers that are not finite."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SavedFlight:
-    """A flight in a file of `hydrone fly`.
+    """A flight in a file of `hydrone fly`."""
 
-    Attributes:
-        name: what the file calls it.
-        policy, seed, vehicle: options it was flown with.
-        scenario: what was flown.
-        references: (K, 4) a period: m, m, m, rad.
-        states: (K + 1, 12) at the start and after each period.
-        detected: (k, 4) spheres in order of detection, m.
-        record: everything the file says of it, see `flight_record`.
-    """
-
-    name: str
-    policy: str
+    name: str  # what the file calls it
+    policy: str  # option it was flown with, as the next two
     seed: int
     vehicle: str
-    scenario: Scenario
-    references: NDArray[np.float64]
-    states: NDArray[np.float64]
-    detected: NDArray[np.float64]
-    record: dict[str, Any]
+    scenario: Scenario  # what was flown
+    references: NDArray[np.float64]  # (K, 4) a period: m, m, m, rad
+    states: NDArray[np.float64]  # (K + 1, 12) at the start and after each period
+    detected: NDArray[np.float64]  # (k, 4) spheres in order of detection, m
+    record: dict[str, Any]  # everything the file says of it, see `flight_record`
 
 
 def read_flights(path: str | Path) -> list[SavedFlight]:
@@ -124,14 +154,11 @@ def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
         )
     record, clearance = saved.record, saved.record["clearance"]
     return Flight(
+        obstacles=len(obstacles),
         scenario=saved.scenario,
         outcome=Outcome[record["outcome"]],
-        time=record["time"],
-        energy=record["energy"],
         clearance=np.inf if clearance is None else float(clearance),
-        transitions=record["transitions"],
-        length=record["length"],
-        episode_return=record["episode_return"],
+        **{name: record[name] for name in ("time", "energy", "transitions", "length", "episode_return")},
         references=saved.references,
         states=saved.states,
         detected=saved.detected,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 RESAMPLES = 2000
+_AT_ONCE = 2_000_000  # numbers that are resampled at once: 16 MB
 _TRIMMED = 0.25  # share cut from each end: what is left is the interquartile range
 
 
@@ -78,6 +79,7 @@ def interquartile_mean(values: ArrayLike, confidence: float = 0.95) -> Estimate:
         (numbers,),
         statistic,
         n_resamples=RESAMPLES,
+        batch=max(1, _AT_ONCE // numbers.size),
         confidence_level=confidence,
         method="percentile",
         vectorized=True,

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -22,6 +23,9 @@ SHA256 = {
     "missions-v1": "72fe7b6e597693931841108dfa61107687b3401fb704cacccc65670575a7acc9",
     "density-v1": "bb01d4f06de6be8501bb4fc11780bb3f9095c7656e5854dd7d5cd5c024b35238",
 }
+HELD_OUT = 10_000_000  # seeds from here on are for evaluation; training uses those below
+MISSIONS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
+_HELD_OUT = re.compile(r"held-out(?:-obstacles-(\d{1,3}))?(?:-radii-(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?))?")
 _PARTS = ("start", "goal", "obstacles")
 
 
@@ -29,20 +33,15 @@ _PARTS = ("start", "goal", "obstacles")
 class Mission:
     """Scenarios of one kind and the environment they are flown in.
 
-    Attributes:
-        name: what tables call it.
-        env_id: registered id of the environment.
-        options: keyword options of that environment, plain data; "vehicle" and "interface" are not among them.
-        scenarios: the worlds; world k of the mission is entry k.
-
     Raises:
         ValueError: no scenario, or an option that belongs to the evaluation.
     """
 
-    name: str
-    env_id: str
+    name: str  #: what tables call it
+    env_id: str  #: registered id of the environment
+    #: keyword options of that environment, plain data; "vehicle" and "interface" are not among them
     options: Mapping[str, Any]
-    scenarios: tuple[Scenario, ...]
+    scenarios: tuple[Scenario, ...]  #: the worlds; world k of the mission is entry k
 
     def __post_init__(self) -> None:
         """Check what would fail later, far from its cause."""
@@ -57,16 +56,13 @@ class Mission:
 class Suite:
     """Missions under one name.
 
-    Attributes:
-        name: what tables call it, for a frozen suite with its version.
-        missions: each with a name of its own.
-
     Raises:
         ValueError: no mission, or two of one name.
     """
 
-    name: str
-    missions: tuple[Mission, ...]
+    name: str  #: what tables call it, for a frozen suite with its version
+    missions: tuple[Mission, ...]  #: each with a name of its own
+    batch: bool = False  #: whether its worlds are flown many at once
 
     def __post_init__(self) -> None:
         """Check that rows can tell the missions apart."""
@@ -82,19 +78,28 @@ class Suite:
 
         Args:
             env_id: registered id.
-            seeds: one a world. Training uses seeds below 10,000,000.
+            seeds: one a world. Training uses seeds below `HELD_OUT`.
             options: keyword options of the environment.
             name: of the suite; the mission is called by the environment's id.
         """
         import gymnasium as gym
 
-        env, scenarios = gym.make(env_id, **(options or {})), []
+        env, scenarios = gym.make(env_id, disable_env_checker=True, **(options or {})), []
         for seed in seeds:
             env.reset(seed=seed)
             scenarios.append(env.get_wrapper_attr("scenario"))
         env.close()
         mission = Mission(name=env_id, env_id=env_id, options=dict(options or {}), scenarios=tuple(scenarios))
         return cls(name=name, missions=(mission,))
+
+    @classmethod
+    def held_out(cls, worlds: int, options: Mapping[str, Any] | None = None, *, name: str = "held-out") -> Self:
+        """Return the worlds that every mission draws from the seeds from `HELD_OUT` on, to be flown in batches."""
+        if worlds < 1:
+            raise ValueError(f"worlds must be a whole number of at least 1, got {worlds}")
+        seeds = range(HELD_OUT, HELD_OUT + worlds)
+        drawn = (cls.drawn(env_id, seeds, options) for env_id in MISSIONS)
+        return cls(name=name, missions=tuple(mission for suite in drawn for mission in suite.missions), batch=True)
 
     def first(self, worlds: int) -> Self:
         """Return the suite with the first so many worlds of each mission, or all where there are fewer."""
@@ -115,12 +120,14 @@ def frozen_suites() -> list[str]:
     return sorted(SHA256)
 
 
-def load_suite(name_or_path: str | os.PathLike[str]) -> Suite:
-    """Return a frozen suite, or one of your own from a file or a folder.
+def load_suite(name_or_path: str | os.PathLike[str], worlds: int | None = None) -> Suite:
+    """Return a frozen suite, worlds held out from training, or a suite of your own from a file or a folder.
 
     Args:
-        name_or_path: "paper-20" for its newest version, "paper-20-v1" for that one; the path of a file that
-            `save_suite` wrote; or a folder of scenario files, one mission, or of such folders, a mission each.
+        name_or_path: "paper-20" for its newest version, "paper-20-v1" for that one; "held-out", also with options of
+            its worlds as in "held-out-obstacles-40-radii-0.8-1.8"; the path of a file that `save_suite` wrote; or a
+            folder of scenario files, one mission, or of such folders, a mission each.
+        worlds: so many of each mission are drawn of those held out, 1,000 unless given.
 
     Raises:
         FileNotFoundError: none of these; the message lists the frozen suites.
@@ -135,11 +142,18 @@ def load_suite(name_or_path: str | os.PathLike[str]) -> Suite:
         if found != SHA256[newest]:
             raise ValueError(f"{path}: the frozen suite is damaged, its SHA-256 is {found}, not {SHA256[newest]}")
         return _read(path)
+    held_out = _HELD_OUT.fullmatch(name)
+    if held_out:
+        count, low, high = held_out.groups()
+        options = {} if count is None else {"num_obstacles": int(count)}
+        radii = {} if low is None else {"obstacle_radius": (float(low), float(high))}
+        return Suite.held_out(1000 if worlds is None else worlds, options | radii, name=name)
     if path.is_dir():
         return _from_folder(path)
     if path.is_file():
         return _read(path)
-    raise FileNotFoundError(f"no suite {name!r}: frozen are {', '.join(frozen_suites())}; or give a file or a folder")
+    frozen = ", ".join(frozen_suites())
+    raise FileNotFoundError(f"no suite {name!r}: frozen are {frozen}; or give held-out, a file or a folder")
 
 
 def _from_folder(folder: Path) -> Suite:

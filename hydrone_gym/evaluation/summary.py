@@ -1,7 +1,8 @@
 """An evaluation in numbers: each policy on each mission, ranked, and how it differs from a baseline on equal worlds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,85 +16,52 @@ BASELINE = "clrrt"  # policy that the others are compared with unless another is
 
 @dataclass(frozen=True, kw_only=True)
 class PolicySummary:
-    """One policy on the worlds of a mission.
+    """One policy on the worlds of a mission."""
 
-    Attributes:
-        policy: its name.
-        rank: from 1, by success, then by time.
-        worlds: flights.
-        success: share that arrived, with the 95 % Wilson interval.
-        collisions, rough_crossings, timeouts, out_of_bounds, diverged: flights that ended so.
-        time, length, energy: s, m and J of the flights that arrived: interquartile mean and 95 % bootstrap interval;
-            None if none did.
-        clearance: least distance to an obstacle over all flights, m; None without obstacles.
-        lateral_speed, tilt: largest at a crossing over all flights, m/s and rad; None without crossings.
-        interventions: of the shield, mean a flight; None without a shield.
-        decision_ms_p50, decision_ms_p99: medians over flights of each flight's percentile, ms.
-    """
-
-    policy: str
-    rank: int
-    worlds: int
-    success: Estimate
-    collisions: int
+    policy: str  #: its name
+    rank: int  #: from 1, by success, then by time
+    worlds: int  #: flights
+    success: Estimate  #: share that arrived, with the 95 % Wilson interval
+    collisions: int  #: flights that ended so, as in the next four
     rough_crossings: int
     timeouts: int
     out_of_bounds: int
     diverged: int
-    time: Estimate | None
-    length: Estimate | None
-    energy: Estimate | None
-    clearance: float | None
-    lateral_speed: float | None
-    tilt: float | None
-    interventions: float | None
-    decision_ms_p50: float
+    time: Estimate | None  #: s, of those that arrived: interquartile mean, 95 % bootstrap interval; None if none did
+    length: Estimate | None  #: likewise, m; None for flights in batches too
+    energy: Estimate | None  #: likewise, J
+    clearance: float | None  #: least distance to an obstacle over all flights, m; None without obstacles
+    lateral_speed: float | None  #: largest at a crossing over all flights, m/s; None without crossings
+    tilt: float | None  #: likewise, rad
+    interventions: float | None  #: of the shield, mean a flight; None without a shield
+    decision_ms_p50: float  #: median over flights of each flight's percentile, ms
     decision_ms_p99: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A policy against the baseline on the worlds that both flew; differences are the policy's less the baseline's.
+    """A policy against the baseline on the worlds that both flew; differences are the policy's less the baseline's."""
 
-    Attributes:
-        policy: its name.
-        worlds: that both flew.
-        success: difference of the success rates with Newcombe's 95 % interval for pairs.
-        only_policy, only_baseline: worlds in which one alone arrived.
-        p_value: of McNemar's exact test, two-sided.
-        both: worlds in which both arrived.
-        time, energy: interquartile mean of the differences over those, s and J, with 95 % bootstrap interval; None if
-            there are none.
-    """
-
-    policy: str
-    worlds: int
-    success: Estimate
-    only_policy: int
+    policy: str  #: its name
+    worlds: int  #: that both flew
+    success: Estimate  #: difference of the success rates with Newcombe's 95 % interval for pairs
+    only_policy: int  #: worlds in which it alone arrived
     only_baseline: int
-    p_value: float
-    both: int
-    time: Estimate | None
-    energy: Estimate | None
+    p_value: float  #: of McNemar's exact test, two-sided
+    both: int  #: worlds in which both arrived
+    time: Estimate | None  #: interquartile mean over those, s, with 95 % bootstrap interval; None if there are none
+    energy: Estimate | None  #: likewise, J
 
 
 @dataclass(frozen=True, kw_only=True)
 class MissionSummary:
-    """All policies on one mission of a suite, or on all its missions together.
+    """All policies on one mission of a suite, or on all its missions together."""
 
-    Attributes:
-        suite: its name.
-        mission: its name, or `ALL_MISSIONS`.
-        baseline: policy that the others are compared with.
-        policies: by rank.
-        comparisons: every other policy with the baseline, by rank.
-    """
-
-    suite: str
-    mission: str
-    baseline: str
-    policies: tuple[PolicySummary, ...]
-    comparisons: tuple[Comparison, ...]
+    suite: str  #: its name
+    mission: str  #: its name, or `ALL_MISSIONS`
+    baseline: str  #: policy that the others are compared with
+    policies: tuple[PolicySummary, ...]  #: by rank
+    comparisons: tuple[Comparison, ...]  #: every other policy with the baseline, by rank
 
 
 def summarise(records: Sequence[Record], baseline: str | None = None) -> list[MissionSummary]:
@@ -124,38 +92,61 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
     return summaries
 
 
+def scores_of(records: Sequence[Record]) -> list[dict[str, Any]]:
+    """Return how the flights of each mission ended, in short: plain data, with means in s and J of those that arrived.
+
+    Args:
+        records: of one policy.
+    """
+    scores = []
+    for mission in dict.fromkeys(record.mission for record in records):
+        flown = [record for record in records if record.mission == mission]
+        arrived = [record for record in flown if record.success]
+        ends = [record.outcome for record in flown]
+        scores.append(
+            {
+                "mission": mission,
+                "episodes": len(flown),
+                "outcomes": {kind.name: ends.count(kind.name) for kind in Outcome if kind.name in ends},
+                "success": len(arrived) / len(flown),
+                "interval": wilson_interval(len(arrived), len(flown)),
+                "time": float(np.mean([record.time for record in arrived])) if arrived else None,
+                "energy": float(np.mean([record.energy for record in arrived])) if arrived else None,
+            }
+        )
+    return scores
+
+
 def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str) -> MissionSummary:
     flown = {name: [r for r in records if r.policy == name] for name in dict.fromkeys(r.policy for r in records)}
-    ranked = sorted(flown, key=lambda name: _order(flown[name]))
+    summed = [_policy(name, those) for name, those in flown.items()]
+    summed.sort(key=lambda p: (-p.success.value, np.inf if p.time is None else p.time.value))
     compared = {(record.mission, record.world): record for record in flown.get(baseline, [])}
-    pairs = {
-        name: [(r, compared[r.mission, r.world]) for r in flown[name] if (r.mission, r.world) in compared]
-        for name in ranked
-        if name != baseline
-    }
+    comparisons = []
+    for name in [p.policy for p in summed if p.policy != baseline]:
+        pairs = [(r, compared[r.mission, r.world]) for r in flown[name] if (r.mission, r.world) in compared]
+        comparisons += [_comparison(name, pairs)] if pairs else []
     return MissionSummary(
         suite=suite,
         mission=mission,
         baseline=baseline,
-        policies=tuple(_policy(name, rank, flown[name]) for rank, name in enumerate(ranked, start=1)),
-        comparisons=tuple(_comparison(name, same_worlds) for name, same_worlds in pairs.items() if same_worlds),
+        policies=tuple(replace(entry, rank=rank) for rank, entry in enumerate(summed, start=1)),
+        comparisons=tuple(comparisons),
     )
 
 
-def _order(records: Sequence[Record]) -> tuple[float, float]:
-    """What policies are ranked by: more success first, then less time."""
-    arrived = [record.time for record in records if record.success]
-    return -len(arrived) / len(records), interquartile_mean(arrived).value if arrived else np.inf
-
-
-def _policy(name: str, rank: int, records: Sequence[Record]) -> PolicySummary:
+def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
     arrived = [record for record in records if record.success]
     low, high = wilson_interval(len(arrived), len(records))
     outcomes = [record.outcome for record in records]
-    interventions = [record.interventions for record in records if record.interventions is not None]
+
+    def there(name: str, among: Sequence[Record] = records) -> list[float]:
+        return [getattr(r, name) for r in among if getattr(r, name) is not None]
+
+    interventions = there("interventions")
     return PolicySummary(
         policy=name,
-        rank=rank,
+        rank=0,
         worlds=len(records),
         success=Estimate(len(arrived) / len(records), low, high),
         collisions=outcomes.count(Outcome.COLLISION.name),
@@ -163,15 +154,15 @@ def _policy(name: str, rank: int, records: Sequence[Record]) -> PolicySummary:
         timeouts=outcomes.count(Outcome.TIMEOUT.name),
         out_of_bounds=outcomes.count(Outcome.OUT_OF_BOUNDS.name),
         diverged=outcomes.count(Outcome.DIVERGED.name),
-        time=_estimate([record.time for record in arrived]),
-        length=_estimate([record.length for record in arrived]),
-        energy=_estimate([record.energy for record in arrived]),
-        clearance=min((r.clearance for r in records if r.clearance is not None), default=None),
-        lateral_speed=max((r.lateral_speed for r in records if r.lateral_speed is not None), default=None),
-        tilt=max((r.tilt for r in records if r.tilt is not None), default=None),
+        time=_estimate(there("time", arrived)),
+        length=_estimate(there("length", arrived)),
+        energy=_estimate(there("energy", arrived)),
+        clearance=min(there("clearance"), default=None),
+        lateral_speed=max(there("lateral_speed"), default=None),
+        tilt=max(there("tilt"), default=None),
         interventions=float(np.mean(interventions)) if interventions else None,
-        decision_ms_p50=float(np.median([record.decision_ms_p50 for record in records])),
-        decision_ms_p99=float(np.median([record.decision_ms_p99 for record in records])),
+        decision_ms_p50=float(np.median(there("decision_ms_p50"))),
+        decision_ms_p99=float(np.median(there("decision_ms_p99"))),
     )
 
 

@@ -36,21 +36,26 @@ def _outcomes(title: str, summary: MissionSummary) -> Table:
     def row(p: PolicySummary) -> tuple[str, ...]:
         counts = (p.collisions, p.rough_crossings, p.timeouts, p.out_of_bounds + p.diverged)
         shield = "-" if p.interventions is None else f"{p.interventions:.1f}"
-        return (f"{p.rank}. {p.policy}", str(p.worlds), _cell(p.success, 100.0, 1), *map(str, counts), shield)
+        clearance = "-" if p.clearance is None else f"{p.clearance:.2f}"
+        success = _cell(p.success, 100.0, 1)
+        return (f"{p.rank}. {p.policy}", str(p.worlds), success, *map(str, counts), clearance, shield)
 
-    heads = ("policy", "worlds", "success (%)", "collisions", "rough\ncrossings", "timeouts", "other", "interventions")
+    counts = ("collisions", "rough\ncrossings", "timeouts", "other")
+    heads = ("policy", "worlds", "success (%)", *counts, "least clear-\nance (m)", "inter-\nventions")
     return Table(title=f"{title}: outcomes", heads=heads, rows=tuple(map(row, summary.policies)))
 
 
 def _measures(title: str, summary: MissionSummary) -> Table:
     def row(p: PolicySummary) -> tuple[str, ...]:
         measures = (_cell(p.time, 1.0, 2), _cell(p.length, 1.0, 1), _cell(p.energy, 1.0, 0))
-        clearance = "-" if p.clearance is None else f"{p.clearance:.2f}"
-        return (p.policy, *measures, clearance, f"{p.decision_ms_p50:.2f} / {p.decision_ms_p99:.2f}")
+        return (p.policy, *measures, f"{p.decision_ms_p50:.2f} / {p.decision_ms_p99:.2f}")
 
-    measures = ("time (s)", "length (m)", "energy (J)")
-    heads = ("policy", *measures, "least\nclearance (m)", "decision\np50 / p99 (ms)")
-    return Table(title=f"{title}: flights that arrived", heads=heads, rows=tuple(map(row, summary.policies)))
+    heads = ("policy", "time (s)", "length (m)", "energy (J)", "decision\np50 / p99 (ms)")
+    return Table(
+        title=f"{title}: flights that arrived, and decisions of all",
+        heads=heads,
+        rows=tuple(map(row, summary.policies)),
+    )
 
 
 def _differences(title: str, summary: MissionSummary) -> Table:

@@ -15,11 +15,10 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from agents import load_agent, shipped_agents
 from agents.agent import PRETRAINED
 from agents.agent_file import TENSORS, TEXT, AgentFile, read_agent, save_agent
-from agents.evaluation import MISSIONS, evaluate
-from agents.export import export_agent
+from agents.algorithms import export_agent
 from agents.network import Network
 from agents.vec_env import HydroneVecEnv
-from hydrone_gym import Outcome
+from hydrone_gym.evaluation import HELD_OUT, MISSIONS, Suite, evaluate, fly_worlds
 
 ID = MISSIONS[0]
 
@@ -86,7 +85,7 @@ def test_a_flight_is_the_same_on_both_interfaces(folder):
 
 
 def test_three_ways_of_evaluating_agree(folder):
-    """Stable-Baselines3's evaluate_policy, a loop by hand, and `evaluate` on the same worlds."""
+    """Stable-Baselines3's evaluate_policy, a loop by hand, and `fly_worlds` on the same worlds."""
     agent, options, by_hand, lengths = load_agent(folder), {"time_limit": 20.0}, [], []
     for seed in range(50, 54):
         env = gym.make(ID, **options)
@@ -101,9 +100,10 @@ def test_three_ways_of_evaluating_agree(folder):
         single.seed(seed)
         returns, _ = evaluate_policy(agent, single, n_eval_episodes=1, return_episode_rewards=True, warn=False)
         assert returns[0] == pytest.approx(total, abs=1e-5)
-    score = evaluate(agent, ID, episodes=4, seed=50, options=options)
-    assert score.outcomes == {k.name: by_hand.count(k) for k in Outcome if k in by_hand}
-    assert score.success == by_hand.count(Outcome.GOAL) / 4
+    rows = gym.make_vec(ID, num_envs=4, vectorization_mode="vector_entry_point", **options)
+    endings = fly_worlds(rows, agent, seed=50)
+    assert [ending.outcome for ending in endings] == by_hand
+    assert [ending.episode_return for ending in endings] == lengths
 
 
 def test_loading_unpickles_nothing(folder, monkeypatch):
@@ -198,4 +198,5 @@ def test_shipped_agents(name):
     folder = PRETRAINED / name
     assert sum(file.stat().st_size for file in folder.iterdir()) < 2_000_000
     assert "## Success on held-out worlds" in (folder / "README.md").read_text(encoding="utf-8")
-    assert evaluate(load_agent(name), ID, episodes=100).success > 0.9
+    records = evaluate(Suite.drawn(ID, range(HELD_OUT, HELD_OUT + 100)), {name: lambda env: load_agent(name, env)})
+    assert sum(record.success for record in records) > 90

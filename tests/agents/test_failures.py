@@ -1,17 +1,19 @@
-"""`python -m agents.failures`: the report holds exactly the failures of the evaluation, and what worlds are like."""
+"""`hydrone failures`: the report holds exactly the failures of the evaluation, and what worlds are like."""
 
 import csv
+import json
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from PIL import Image
 
-from agents.evaluation import HELD_OUT, MISSIONS, evaluate, evaluate_missions, fly_worlds, policy_for, score_of
-from agents.failures.report import find_failures, main
+from agents.failures.report import find_failures
 from agents.failures.tables import COLUMNS
 from agents.failures.worlds import MEDIA, features_of
-from hydrone_gym.evaluation import fly
+from hydrone_gym.cli import main
+from hydrone_gym.evaluation import HELD_OUT, MISSIONS, Suite, fly
+from hydrone_gym.evaluation.plan import make_plan
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.bodies import gaps_along
 from planners import StraightLine
@@ -22,7 +24,9 @@ FIGURES = ("failures-where.png", "failures-how.png", "failures-worlds.png")
 
 def report(folder, capsys, *options):
     """Run the command; return what it printed and the lines of its CSV file."""
-    assert main(["--agent", "straight-line", "--episodes", str(EPISODES), "--out", str(folder), *options]) == 0
+    assert (
+        main(["failures", "--agent", "straight-line", "--episodes", str(EPISODES), "--out", str(folder), *options]) == 0
+    )
     with (folder / "failures.csv").open(newline="", encoding="utf-8") as stream:
         return capsys.readouterr().out, list(csv.DictReader(stream))
 
@@ -99,25 +103,22 @@ def test_the_shield_leaves_no_contact(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--agent", "nobody"], "failures: error: no agent 'nobody': shipped are"),
-        (["--agent", "ppo", "--episodes", "0"], "episodes must be at least 1, got 0"),
+        (["--agent", "nobody"], "hydrone: error: no policy 'nobody': known are"),
+        (["--agent", "ppo", "--episodes", "0"], "worlds must be a whole number of at least 1, got 0"),
+        (["--agent", "ppo", "--obstacles", "100000000"], "--obstacles must be at most 1000, got 100000000"),
     ],
 )
 def test_bad_options(tmp_path, capsys, options, message):
-    assert main([*options, "--out", str(tmp_path)]) == 2
+    assert main(["failures", *options, "--out", str(tmp_path)]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_worlds_end_as_single_flights_do(flown):
-    for mission, flights in flown.items():
-        env = gym.make(mission)
-        policy = policy_for("straight-line", env, shield=False)
-        ends = fly_worlds(policy, mission, episodes=EPISODES)
-        assert ends.outcome.tolist() == [int(flight.outcome) for _, flight in flights]
-        assert ends.time.tolist() == [flight.time for _, flight in flights]
-        assert ends.energy.tolist() == [flight.energy for _, flight in flights]
-        assert score_of(mission, ends) == evaluate(policy, mission, episodes=EPISODES)
-    assert evaluate_missions("straight-line", shield=False, episodes=EPISODES)[-1] == score_of(mission, ends)
+def test_json(tmp_path, capsys, flown):
+    text, _ = report(tmp_path, capsys, "--json")
+    document = json.loads(text)
+    failed = [(m, seed, f.outcome.name) for m in MISSIONS for seed, f in flown[m] if f.outcome is not Outcome.GOAL]
+    assert [(f["mission"], f["seed"], f["outcome"]) for f in document["failures"]] == failed
+    assert [(score["mission"], score["episodes"]) for score in document["scores"]] == [(m, EPISODES) for m in MISSIONS]
 
 
 class Crowd(StraightLine):
@@ -130,20 +131,27 @@ class Crowd(StraightLine):
 
 
 def test_a_policy_that_is_another_one_in_a_batch():
-    options = {"time_limit": 20.0, "num_obstacles": 0}
-    env = gym.make(MISSIONS[0], **options)
+    suite = Suite.held_out(2, {"time_limit": 20.0, "num_obstacles": 0})
     with pytest.raises(ValueError, match=r"world 10000000: TIMEOUT in the batch but GOAL alone"):
-        find_failures(Crowd.for_env(env), MISSIONS[0], episodes=2, options=options)
+        find_failures(make_plan(suite, {"crowd": Crowd.for_env}))
+
+
+def test_a_policy_that_raises_gives_1(tmp_path, capsys):
+    (tmp_path / "leaky.py").write_text(
+        "class Leaky:\n  def __init__(self, env):\n    pass\n  predict = None.__init__\n"
+    )
+    options = ["--agent", f"{tmp_path / 'leaky.py'}:Leaky", "--episodes", "1", "--out", str(tmp_path)]
+    assert main(["failures", *options]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "failed in suite held-out, mission HydroneGym/Mission-v0, world 0: TypeError" in line
 
 
 @pytest.mark.parametrize("mission", MISSIONS)
 def test_features_of_worlds(mission):
     """Against a search of 2001 points of the line, sphere by sphere."""
-    env, seeds = gym.make(mission), np.arange(HELD_OUT, HELD_OUT + 40)
-    features = features_of(env, seeds)
-    for number, seed in enumerate(seeds.tolist()):
-        env.reset(seed=seed)
-        scenario = env.unwrapped.scenario
+    scenarios = Suite.drawn(mission, range(HELD_OUT, HELD_OUT + 40)).missions[0].scenarios
+    features = features_of(scenarios, reach=1.25)
+    for number, scenario in enumerate(scenarios):
         start, goal = np.array(scenario.start[:3]), np.array(scenario.goal)
         points = start + np.linspace(0.0, 1.0, 2001)[:, None] * (goal - start)
         gaps = np.array([np.linalg.norm(points - x[:3], axis=1).min() - x[3] for x in scenario.obstacles])

@@ -7,7 +7,7 @@ import pytest
 import hydrone_gym  # noqa: F401  (registers the ids)
 from agents.failures import causes
 from agents.failures.causes import examine
-from agents.failures.flights import fly_again
+from agents.failures.flights import fly_failed
 from hydrone_gym.evaluation import fly
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.scenario import Scenario
@@ -47,7 +47,7 @@ def world(start, goal, *spheres, **options):
 
 
 def failure_of(env, policy, outcome):
-    return examine(fly_again(env, policy, MISSION, 0, outcome), env.unwrapped.world)
+    return examine(fly_failed(env, policy, env.scenario, mission=MISSION, seed=0, outcome=outcome.name))
 
 
 def flown_by_hand(env, policy):

@@ -3,11 +3,11 @@
 import gymnasium as gym
 import numpy as np
 
-from agents.evaluation import MISSIONS
 from agents.recipe import load_recipe
 from agents.shielded import INTERVENTION, ShieldedVecEnv
 from agents.vec_env import HydroneVecEnv
 from hydrone_gym import Outcome
+from hydrone_gym.evaluation import MISSIONS
 from hydrone_gym.perception.egocentric import Egocentric
 from planners.shield import Shield
 

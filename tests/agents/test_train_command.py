@@ -1,5 +1,7 @@
 """`hydrone train` from the command line, and the plain Stable-Baselines3 example of docs/training.md."""
 
+import ast
+import functools
 import json
 import re
 from pathlib import Path
@@ -9,6 +11,7 @@ import yaml
 
 from agents import load_agent
 from hydrone_gym.cli import main
+from hydrone_gym.evaluation import evaluate_held_out
 from tests.agents.test_training import RECIPES, SMALL
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,12 +62,36 @@ def test_bad_options(tmp_path, capsys):
     assert main(["train", "--resume", str(tmp_path)]) == 2
     assert "no training run" in capsys.readouterr().err
     assert main(["train", "--resume", str(tmp_path), "--seed", "3"]) == 2
-    assert "--resume excludes seed" in capsys.readouterr().err
+    assert "--resume excludes seed:" in capsys.readouterr().err
+    assert main(["train", "--resume", str(tmp_path), "--obstacles", "3", "--steps", "4"]) == 2
+    assert "--resume excludes steps, obstacles:" in capsys.readouterr().err
+    assert main(["train", "--obstacles", "100000000", "--out", str(tmp_path)]) == 2
+    assert "--obstacles must be at most 1000" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["a: !!python/object/apply:os.system ['true']", "a: [", "a: b: c"])
+def test_a_recipe_that_is_no_yaml_is_told_in_one_line(tmp_path, capsys, text):
+    path = tmp_path / "bad.yml"
+    path.write_text(text)
+    assert main(["train", "--recipe", str(path), "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"hydrone: error: {path}: no YAML: ")
+
+    assert not (tmp_path / "run").exists()
+
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "config.yaml").write_text(text)
+    assert main(["train", "--resume", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"hydrone: error: {tmp_path / 'run' / 'config.yaml'}: no YAML: ")
+
+
+def test_bad_seed(tmp_path, capsys):
     assert main(["train", "--out", str(tmp_path), "--seed", "-1"]) == 2
     assert "seed must lie between" in capsys.readouterr().err
 
 
-def test_the_example_of_the_docs(tmp_path, monkeypatch):
+def test_the_example_of_the_docs(tmp_path, monkeypatch, capsys):
     """The first Python block trains with plain Stable-Baselines3; here with fewer steps."""
     text = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
     block = re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0]
@@ -72,6 +99,9 @@ def test_the_example_of_the_docs(tmp_path, monkeypatch):
     short = block.replace("1_000_000", "512").replace("num_envs=256", "num_envs=16").replace("n_steps=64", "n_steps=16")
     assert short != block
     monkeypatch.chdir(tmp_path)
-    space: dict = {}
-    exec(compile(short, "docs/training.md", "exec"), space)
-    assert 0.0 <= space["score"].success <= 1.0
+    with monkeypatch.context() as few:
+        few.setattr("hydrone_gym.evaluation.evaluate_held_out", functools.partial(evaluate_held_out, worlds=20))
+        exec(compile(short, "docs/training.md", "exec"), {})
+    scores = ast.literal_eval(capsys.readouterr().out)
+    assert [score["episodes"] for score in scores] == [20, 20, 20]
+    assert all(0.0 <= score["success"] <= 1.0 for score in scores)

@@ -14,13 +14,12 @@ import yaml
 from agents import run_log, training
 from agents.agent_file import read_agent
 from agents.algorithms import ALGORITHMS
-from agents.checkpoint import checkpoints
-from agents.evaluation import HELD_OUT, MISSIONS
+from agents.checkpoint import checkpoints, load_buffer, save_buffer
 from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, FOLDER, load_recipe
-from agents.replay import load_replay, save_replay
 from agents.run_log import RunLog
 from agents.training import TrainingRun, resume, train
+from hydrone_gym.evaluation import HELD_OUT, MISSIONS
 
 SMALL = {
     ENV_ID: {
@@ -83,8 +82,8 @@ def curve(folder):
 
 def test_a_run_folder_is_complete(tmp_path, recipe):
     folder = tmp_path / "run"
-    scores = train(small_run(folder, recipe, evaluation_episodes=8))
-    assert [score.mission for score in scores] == list(MISSIONS)
+    records, scores = train(small_run(folder, recipe, evaluation_episodes=8))
+    assert [record.mission for record in records[::8]] == [score["mission"] for score in scores] == list(MISSIONS)
     assert [entry["episodes"] for entry in json.loads((folder / "evaluation.json").read_text())] == [8, 8, 8]
     assert (folder / "curve.png").stat().st_size > 1000
     assert [int(line["steps"]) for line in curve(folder)] == [PERIOD * k for k in range(1, 7)]
@@ -138,9 +137,9 @@ def test_a_replay_buffer_survives_its_file(tmp_path, steps):
     arguments = {"learning_starts": 10**6, "buffer_size": 180, "n_steps": 3, "seed": 0, "device": "cpu"}
     model = ALGORITHMS["sac"].model("MlpPolicy", rows, **arguments)
     model.learn(6 * steps)
-    save_replay(model.replay_buffer, tmp_path / "replay.npz")
+    save_buffer(model.replay_buffer, tmp_path / "replay.npz")
     other = ALGORITHMS["sac"].model("MlpPolicy", rows, **arguments)
-    load_replay(other.replay_buffer, tmp_path / "replay.npz")
+    load_buffer(other.replay_buffer, tmp_path / "replay.npz")
     assert model.replay_buffer.timeouts.any()
     for name, value in vars(model.replay_buffer).items():
         np.testing.assert_array_equal(value, getattr(other.replay_buffer, name), err_msg=name)
@@ -185,7 +184,7 @@ def test_start_from_takes_the_weights(tmp_path, recipe, monkeypatch):
 def test_the_recipe_says_what_the_rows_fly_in(tmp_path, monkeypatch):
     """In training, unless the run says something else; evaluation flies what the run says."""
     flown = []
-    monkeypatch.setattr(training, "evaluate_missions", lambda agent, **told: flown.append(told["options"]) or [])
+    monkeypatch.setattr(training, "evaluate_held_out", lambda policy, **told: (flown.append(told["options"]) or [], []))
     made = []
     monkeypatch.setattr(
         training, "MissionMix", lambda *args, **more: made.append(MissionMix(*args, **more)) or made[-1]

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from agents import load_agent
-from agents.evaluation import evaluate
 from benchmarks import generalisation_table as table
 from benchmarks.generalisation import FIRST, main
 from benchmarks.results import sheets_of
 from benchmarks.tables import BEGIN, END, put_into
 from benchmarks.world_shapes import SHAPES
-from hydrone_gym.evaluation import fly
+from hydrone_gym.evaluation import Suite, evaluate, fly
 from hydrone_gym.evaluation.policies import find_policy
 from hydrone_gym.evaluation.statistics import wilson_interval
+from hydrone_gym.evaluation.summary import scores_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 FLOWN = ("ppo", "straight-line", "straight-line-shield", "clrrt")
@@ -46,10 +46,11 @@ def test_it_says_where_the_figures_come_from(record):
 
 def test_random_missions_are_those_of_the_evaluation(record):
     cell = cell_of(record, "random missions", "ppo")
-    score = evaluate(load_agent("ppo"), "HydroneGym/Mission-v0", episodes=6, seed=FIRST)
-    assert (cell["outcomes"], cell["success"]) == (score.outcomes, score.success)
-    assert (cell["time"], cell["energy"]) == (score.time, score.energy)
-    assert tuple(cell["interval"]) == score.interval
+    suite = Suite.drawn("HydroneGym/Mission-v0", range(FIRST, FIRST + 6))
+    (score,) = scores_of(evaluate(suite, {"ppo": lambda env: load_agent("ppo")}))
+    assert (cell["outcomes"], cell["success"]) == (score["outcomes"], score["success"])
+    assert (cell["time"], cell["energy"]) == (score["time"], score["energy"])
+    assert tuple(cell["interval"]) == score["interval"]
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import pytest
 import yaml
 
 from agents import recipe as recipes
-from agents.evaluation import MISSIONS, evaluate_missions
 from agents.run_log import COLUMNS
 from benchmarks.training_seeds import DENSE, Arguments, effort, measure, sheets, trained
+from hydrone_gym.evaluation import MISSIONS, evaluate_held_out
 
 SMALL = {
     recipes.ENV_ID: {
@@ -43,8 +43,9 @@ def test_runs_are_trained_once_and_evaluated_as_they_are_meant_to_fly(tmp_path):
     shielded, alone = measured["runs"]
     assert [(c["worlds"], c["mission"]) for c in alone["flights"]] == [("20 spheres", m) for m in MISSIONS]
     assert [c["worlds"] for c in shielded["flights"]] == ["20 spheres"] * 3 + ["40 larger spheres"] * 3
-    dense = evaluate_missions(runs / "ppo_shielded-3" / "agent", shield=True, episodes=6, options=DENSE.options)
-    assert [c["outcomes"] for c in shielded["flights"][3:]] == [score.outcomes for score in dense]
+    agent = f"{runs / 'ppo_shielded-3' / 'agent'}+shield"
+    _, dense = evaluate_held_out(agent, worlds=6, options=DENSE.options)
+    assert [c["outcomes"] for c in shielded["flights"][3:]] == [score["outcomes"] for score in dense]
     written = {path: path.stat().st_mtime_ns for path in runs.rglob("*") if path.is_file()}
     assert trained("ppo_shielded", 3, runs) == runs / "ppo_shielded-3"
     assert written == {path: path.stat().st_mtime_ns for path in runs.rglob("*") if path.is_file()}

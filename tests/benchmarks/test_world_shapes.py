@@ -4,9 +4,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents.evaluation import HELD_OUT
 from benchmarks.generalisation import FIRST
 from benchmarks.world_shapes import SHAPED, SHAPES, EndLaw
+from hydrone_gym.evaluation import HELD_OUT
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.world.solvability import is_solvable
 from hydrone_gym.world.world import World

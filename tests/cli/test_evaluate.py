@@ -165,7 +165,9 @@ def test_a_stopped_evaluation_goes_on_to_the_same_rows(how, tmp_path, uninterrup
         (["--baseline", "ppo"], "--baseline must be one of straight-line, straight-line-shield, got 'ppo'"),
         (["--worlds", "0"], "worlds must be a whole number of at least 1, got 0"),
         (["--seed", "-1"], "seed must be a whole number of at least 0, got -1"),
-        (["--jobs", "0"], "jobs must be a whole number of at least 1, got 0"),
+        (["--jobs", "0"], "jobs must be a whole number of at least 1, at most 1024, got 0"),
+        (["--jobs", "100000"], "jobs must be a whole number of at least 1, at most 1024, got 100000"),
+        (["--suites", "held-out-obstacles-100000000"], "no suite 'held-out-obstacles-100000000'"),
         (["--backend", "pigeon"], "pigeon"),
     ],
 )

@@ -16,7 +16,7 @@ from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import PolicySource
 from hydrone_gym.evaluation.records import HEADER, read_records, to_line
-from hydrone_gym.evaluation.results import write_results
+from hydrone_gym.evaluation.run_folder import write_results
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.evaluation.suites import Mission, Suite
 from hydrone_gym.evaluation.summary import summarise
@@ -235,10 +235,8 @@ def test_damaged_input_is_named(folder, tmp_path):
     refused({**document, "version": 9}, "must be a hydrone_gym evaluation summary of version 1, got .* version 9")
     refused({key: document[key] for key in document if key != "machine"}, "lacks machine")
     broken = json.loads(json.dumps(document))
-    broken["missions"][0]["policies"][0]["success"]["value"] = "much"
-    refused(broken, r"summary.json: damaged")
-    del broken["missions"][0]["policies"][0]["success"]
-    refused(broken, r"summary.json: damaged: TypeError: .*success")
+    del broken["missions"][0]["policies"][0]["policy"]
+    refused(broken, r"summary.json: damaged: KeyError: 'policy'")
     refused({**document, "machine": "a fast one"}, "machine must be a dict, got str")
     named = {**document["arguments"], "policies": {"other": "nowhere:nothing"}}
     refused({**document, "arguments": named}, "summary.json does not sum up rows.csv")

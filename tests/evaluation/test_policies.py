@@ -1,5 +1,6 @@
 """Policies are found by every way of naming them, and what cannot be found is told in one line."""
 
+import functools
 import pickle
 import shutil
 import subprocess
@@ -99,6 +100,27 @@ def test_a_folder_of_a_trained_agent(tmp_path, env, monkeypatch):
     monkeypatch.chdir("/")
     assert source.make(env, 0).file.name == shipped_agents()[0]
     assert source.origin == f"agents.named:from_folder {tmp_path / 'run' / 'agent'}"
+
+
+class Sower:
+    """Takes a seed, or not, behind a method that hands on whatever it is given."""
+
+    def __init__(self, env, seed=None):
+        self.seed, self.predict = seed, None.__init__
+
+    @classmethod
+    def for_env(cls, env, **options):
+        return cls(env, **options)
+
+
+class Unsown(Sower):
+    def __init__(self, env):
+        super().__init__(env, "none")
+
+
+def test_a_seed_is_handed_on_to_the_class(env):
+    factories = {"a": Sower.for_env, "b": functools.partial(Sower.for_env), "c": Unsown.for_env, "d": Sower}
+    assert [source.make(env, 5).seed for source in find_policies(factories)] == [5, 5, "none", 5]
 
 
 def test_a_factory_as_it_is(env):

@@ -11,12 +11,11 @@ import pytest
 
 from hydrone_gym.cli import main
 from hydrone_gym.evaluation.page import write_report
-from hydrone_gym.evaluation.plan import make_plan
+from hydrone_gym.evaluation.plan import make_plan, plan_of
 from hydrone_gym.evaluation.records import read_records
-from hydrone_gym.evaluation.replays import plan_of, shown_flights
-from hydrone_gym.evaluation.results import write_results
 from hydrone_gym.evaluation.run import carry_out
-from hydrone_gym.evaluation.run_folder import RunFolder
+from hydrone_gym.evaluation.run_folder import RunFolder, write_results
+from hydrone_gym.evaluation.shown import shown_flights
 from hydrone_gym.evaluation.suites import load_suite
 from tests.evaluation.test_page import Page, store
 from tests.evaluation.test_records import ROW

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hydrone_gym.evaluation import fly, percentiles, wilson_interval
-from hydrone_gym.evaluation.report import draw_flight, flight_record, plain
+from hydrone_gym.evaluation.flight_figures import draw_flight
+from hydrone_gym.evaluation.saved import flight_record, plain
 from planners import StraightLine
 
 

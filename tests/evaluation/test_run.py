@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import replace
 
 import gymnasium as gym
@@ -10,9 +11,20 @@ import joblib
 import numpy as np
 import pytest
 
-import agents.evaluation
 from agents import load_agent
-from hydrone_gym.evaluation import Suite, evaluate, fly, load_suite
+from hydrone_gym.evaluation import (
+    HELD_OUT,
+    MISSIONS,
+    EvaluationStopped,
+    Suite,
+    evaluate,
+    evaluate_held_out,
+    fly,
+    fly_worlds,
+    load_suite,
+    read_records,
+    wilson_interval,
+)
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import WORLDS_A_JOB, make_plan
 from hydrone_gym.evaluation.records import TIMING
@@ -156,13 +168,60 @@ def test_a_flight_leaves_no_trace_in_the_next():
 
 
 def test_agrees_with_flying_all_worlds_in_one_batch():
-    env_id, worlds, seed = "HydroneGym/Mission-v0", 12, agents.evaluation.HELD_OUT
-    score = agents.evaluation.evaluate(load_agent("ppo"), env_id, episodes=worlds, seed=seed)
-    rows = evaluate(Suite.drawn(env_id, range(seed, seed + worlds)), "ppo")
-    arrived = [row for row in rows if row.success]
-    assert {name: sum(row.outcome == name for row in rows) for name in score.outcomes} == score.outcomes
-    assert score.time == pytest.approx(np.mean([row.time for row in arrived]), rel=1e-12)
-    assert score.energy == pytest.approx(np.mean([row.energy for row in arrived]), rel=1e-12)
+    """The same rows, but for the length of paths and the times of decisions, from seeds and from scenarios."""
+    policies = ["ppo", "straight-line+shield", "clrrt"]
+    suite = load_suite("held-out-obstacles-30-radii-0.8-1.8", 6)
+    assert [(m.name, len(m.scenarios), len(m.scenarios[0].obstacles)) for m in suite.missions] == [
+        (name, 6, 30) for name in MISSIONS
+    ]
+    batch = evaluate(suite, policies, vehicle="physical")
+    alone = evaluate(replace(suite, batch=False), policies, vehicle="physical")
+    assert {row.length for row in batch} == {None}
+    assert {row.policy for row in batch if row.interventions} == {"straight-line+shield"}
+    assert all(0.0 < row.decision_ms_p50 <= row.decision_ms_max for row in batch)
+    whole = {row.key: replace(row, length=None) for row in timeless(alone)}
+    assert {row.key: row for row in timeless(batch)} == whole
+    mission, options = suite.missions[0], {**suite.missions[0].options, "vehicle": "physical"}
+    rows = gym.make_vec(mission.env_id, num_envs=6, vectorization_mode="vector_entry_point", **options)
+    drawn = fly_worlds(rows, load_agent("ppo"), seed=HELD_OUT)
+    assert [(e.outcome.name, e.obstacles, e.time) for e in drawn] == [
+        (row.outcome, row.obstacles, row.time) for row in batch if (row.mission, row.policy) == (mission.name, "ppo")
+    ]
+
+
+def test_a_batch_that_breaks_off_is_told_and_the_others_are_kept(tmp_path):
+    class Crowded:
+        def __init__(self, env):
+            self.line = StraightLine.for_env(env)
+
+        def predict(self, observation, state=None, episode_start=None, deterministic=False):
+            if np.ndim(observation["state"]) == 2:
+                raise OSError("too many")
+            return self.line.predict(observation, state, episode_start)
+
+    policies = {"line": "straight-line", "crowded": Crowded}
+    with pytest.raises(
+        EvaluationStopped, match="policy 'crowded' failed in suite held-out, mission HydroneGym/Mission-v0, world 0: O"
+    ):
+        evaluate("held-out", policies, worlds=2, out=tmp_path)
+    kept = read_records(tmp_path / "rows.csv")
+    assert [(row.policy, row.world) for row in kept] == [("line", 0), ("line", 1)]
+    again = evaluate("held-out", {**policies, "crowded": policies["line"]}, worlds=2)
+    assert [row.key for row in again[:2]] == [row.key for row in kept]
+
+
+def test_an_evaluation_of_held_out_worlds_is_scored():
+    records, scores = evaluate_held_out("straight-line", worlds=7, options={"num_obstacles": 25, "vehicle": "physical"})
+    assert [score["mission"] for score in scores] == list(MISSIONS)
+    for score in scores:
+        flown = [record for record in records if record.mission == score["mission"]]
+        arrived = [record for record in flown if record.outcome == "GOAL"]
+        assert (score["episodes"], score["success"]) == (7, len(arrived) / 7)
+        assert score["outcomes"] == Counter(record.outcome for record in flown)
+        assert score["interval"] == wilson_interval(len(arrived), 7)
+        assert score["time"] == pytest.approx(np.mean([record.time for record in arrived]))
+        assert score["energy"] == pytest.approx(np.mean([record.energy for record in arrived]))
+    assert {record.obstacles for record in records} == {25}
 
 
 def test_shipped_agents_fly_without_torch():

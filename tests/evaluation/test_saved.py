@@ -8,8 +8,7 @@ import pytest
 
 import hydrone_gym  # noqa: F401
 from hydrone_gym.evaluation import fly
-from hydrone_gym.evaluation.report import flight_record
-from hydrone_gym.evaluation.saved import FORMAT, VERSION, read_flights, restore
+from hydrone_gym.evaluation.saved import FORMAT, VERSION, flight_record, read_flights, restore
 from planners import CLRRT, StraightLine
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from hydrone_gym.evaluation import EvaluationStopped, evaluate, load_suite, read_records
 from hydrone_gym.evaluation.plan import WORLDS_A_JOB, make_plan
+from hydrone_gym.evaluation.run import carry_out
 from hydrone_gym.evaluation.run_folder import ROWS, RUN, RunFolder
 from tests.evaluation.test_run import timeless
 
@@ -69,7 +70,8 @@ def test_policies_in_another_order_are_another_evaluation(finished):
 def test_overwriting_begins_anew(finished, tmp_path):
     for name in (RUN, ROWS):
         (tmp_path / name).write_bytes((finished / name).read_bytes())
-    records = evaluate("paper-20", "straight-line", worlds=2, out=tmp_path, overwrite=True)
+    plan = make_plan("paper-20", "straight-line", worlds=2)
+    records = carry_out(plan, RunFolder(tmp_path, plan.arguments(), overwrite=True))
     assert read_records(tmp_path / ROWS) == records
     assert len(records) == 4
     assert json.loads((tmp_path / RUN).read_text())["arguments"]["policies"].keys() == {"straight-line"}
@@ -218,7 +220,8 @@ def test_a_block_that_is_written_in_part_is_written_to_its_end(tmp_path, monkeyp
     [
         ({"worlds": 0}, "worlds must be a whole number of at least 1, got 0"),
         ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
-        ({"jobs": 0}, "jobs must be a whole number of at least 1, got 0"),
+        ({"jobs": 0}, "jobs must be a whole number of at least 1, at most 1024, got 0"),
+        ({"jobs": 100_000}, "jobs must be a whole number of at least 1, at most 1024, got 100000"),
         ({"vehicle": "submarine"}, "submarine"),
         ({"backend": "carrier-pigeon"}, "carrier-pigeon"),
         ({"suites": ["paper-20", "paper-20-v1"]}, "suites must have different names"),

@@ -8,10 +8,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents.evaluation import HELD_OUT
 from benchmarks.freeze_suites import IDS, RECIPES, draw
 from hydrone_gym.envs.hydrone_env import known_options
-from hydrone_gym.evaluation import Mission, Suite, frozen_suites, load_suite, save_suite
+from hydrone_gym.evaluation import HELD_OUT, Mission, Suite, frozen_suites, load_suite, save_suite
 from hydrone_gym.evaluation.suites import FOLDER, SHA256
 from hydrone_gym.world.scenario import Scenario, save_scenario
 

@@ -125,14 +125,17 @@ def test_tables_show_the_figures(records, capsys):
     assert outcomes.rows[1][:2] == ("2. quick", "60")
     assert outcomes.rows[1][3:] == (
         *map(str, (quick.collisions, quick.rough_crossings, quick.timeouts, quick.out_of_bounds + quick.diverged)),
+        f"{quick.clearance:.2f}",
         "-",
     )
-    assert measures.rows[2] == ("lost", "-", "-", "-", "-", "1.50 / 9.50")
+    assert quick.clearance < 0.0  # of a flight that did not arrive: it stands among the outcomes
+    assert not any("clearance" in head for head in measures.heads)
+    assert measures.rows[2] == ("lost", "-", "-", "-", "1.50 / 9.50")
     time = summaries[0].comparisons[0].time
     assert differences.rows[0][5] == f"{time.value:+.2f} [{time.low:+.2f}, {time.high:+.2f}]"
     text = markdown([outcomes, measures, differences])
     lines = text.splitlines()
-    assert lines.count("| 1. safe | 60 | 100.0 [94.0, 100.0] | 0 | 0 | 0 | 0 | 1.0 |") == 1
+    assert lines.count("| 1. safe | 60 | 100.0 [94.0, 100.0] | 0 | 0 | 0 | 0 | 0.50 | 1.0 |") == 1
     for line in lines:
         assert not line or line.startswith(("| ", "### ", "|---|"))
     print_tables([outcomes, measures, differences])
