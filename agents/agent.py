@@ -2,14 +2,14 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent_file import TEXT, AgentFile, read_agent
-from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, Memory, RawObservation
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, Memory, Modelled, RawObservation
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.world.world import World
 
@@ -25,13 +25,13 @@ class Agent:
 
     Args:
         file: the network and what is known about it.
-        simulation: of the environment, for its vehicle and world; the default ones unless given.
+        model: what it believes, for its vehicle and world; the default ones unless given.
 
     Raises:
         ValueError: a network with other inputs or outputs than the egocentric interface has.
     """
 
-    def __init__(self, file: AgentFile, simulation: Simulation | None = None) -> None:
+    def __init__(self, file: AgentFile, model: Modelled | None = None) -> None:
         """Check that the network fits the interface."""
         sizes = file.network.sizes
         if (sizes[0], sizes[-1]) != (OBSERVATION_SIZE, ACTIONS):
@@ -40,7 +40,7 @@ class Agent:
                 f"the egocentric interface has {OBSERVATION_SIZE} and {ACTIONS}"
             )
         self.file = file
-        self._egocentric = Egocentric(Simulation(HYDRONE, World()) if simulation is None else simulation)
+        self._egocentric = Egocentric(SimpleNamespace(vehicle=HYDRONE, world=World()) if model is None else model)
 
     def predict(
         self,
@@ -95,15 +95,13 @@ def load_agent(name_or_path: str | os.PathLike[str], env: Any = None) -> Agent:
     if not folder.exists():
         names = ", ".join(shipped_agents()) or "none"
         raise FileNotFoundError(f"no agent {os.fspath(name_or_path)!r}: shipped are {names}; or give a folder")
-    return Agent(read_agent(folder), None if env is None else _simulation_of(env))
+    if env is None:
+        return Agent(read_agent(folder))
+    from planners.belief import belief_of
+
+    return Agent(read_agent(folder), belief_of(env))
 
 
 def shipped_agents() -> list[str]:
     """Return the names of the agents in the package."""
     return sorted(text.parent.name for text in PRETRAINED.glob(f"*/{TEXT}"))
-
-
-def _simulation_of(env: Any) -> Simulation:
-    from planners.belief import belief_of
-
-    return belief_of(env)

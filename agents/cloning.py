@@ -22,7 +22,6 @@ from agents.agent_file import TEXT, AgentFile, save_agent
 from agents.algorithms import network_of
 from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Demonstration, Demonstrations
-from agents.evaluation import MISSIONS
 from hydrone_gym.evaluation import provenance
 from hydrone_gym.evaluation.suites import MISSIONS
 from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric

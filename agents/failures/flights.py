@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.policies import Policy
-from hydrone_gym.evaluation.policy import Policy
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World

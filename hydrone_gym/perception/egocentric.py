@@ -40,7 +40,7 @@ yaw reference is unused, it is the heading of the moment, so that the vehicle do
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,10 +50,11 @@ from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.perception.rays import FIXED, RAY_NAMES, cast_along, cast_fixed, leave_box
 from hydrone_gym.perception.relative import mission_frame, pack_egocentric, place_references
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.storage import new_rows
 from hydrone_gym.simulation.time_to_go import time_to_go
 from hydrone_gym.surface import is_air
+from hydrone_gym.vehicle import Vehicle
+from hydrone_gym.world.world import World
 
 RawObservation = Mapping[str, NDArray]
 
@@ -179,16 +180,28 @@ def new_memory(count: int) -> NDArray[np.float64]:
     return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
+class Modelled(Protocol):
+    """A belief, a simulation, or anything else that has a vehicle and a world."""
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle."""
+
+    @property
+    def world(self) -> World:
+        """The world."""
+
+
 class Egocentric:
     """Sees and acts as `interface="egocentric"` does: for environments, and through the raw interface, bit for bit.
 
     Args:
-        simulation: of the environment; vehicle and world are read from it.
+        model: what a policy believes; only its vehicle and world are read.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, model: Modelled) -> None:
         """Pack the constants."""
-        self.values = pack_egocentric(simulation.vehicle, simulation.world)
+        self.values = pack_egocentric(model.vehicle, model.world)
 
     def look(
         self, perceived: Perceived, memory: NDArray[np.float64], rows: NDArray[np.int64], seen: NDArray[np.float32]
