@@ -84,10 +84,20 @@ def substep(b, i, lanes, fraction, inverse_period, model):
     new = step(state, attitude, speeds, model.vehicle, medium, air, DT)
     scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + shaft_power(medium, speeds) * DT)
     crossed = air != is_air(new.z)
-    integral = select(crossed, Integral(0.0, 0.0, 0.0, 0.0), integral)
-    scatter(b, FLOWN_AT.integral, i, lanes, integral)
-    note_crossing(b, i, lanes, crossed, new, attitude)
+    scatter(
+        b,
+        FLOWN_AT.integral,
+        i,
+        lanes,
+        Integral(
+            0.0 if crossed else integral.z,
+            0.0 if crossed else integral.phi,
+            0.0 if crossed else integral.theta,
+            0.0 if crossed else integral.psi,
+        ),
+    )
     scatter(b, FLOWN_AT.state, i, lanes, new)
+    note_crossing(b, i, lanes, crossed, new, attitude)
 
 
 @inlined
@@ -97,13 +107,13 @@ def note_crossing(b, i, lanes, crossed, new, attitude):
     cosine = attitude.c_phi * attitude.c_theta
     c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
     noted = Crossing(
-        c.number + 1.0,
-        1.0 if is_air(new.z) else -1.0,
-        c.speed2 if speed2 <= c.speed2 else speed2,
-        c.cos_tilt if cosine >= c.cos_tilt else cosine,
-        new.vz,
+        c.number + (1.0 if crossed else 0.0),
+        (1.0 if is_air(new.z) else -1.0) if crossed else c.direction,
+        speed2 if crossed and not speed2 <= c.speed2 else c.speed2,
+        cosine if crossed and not cosine >= c.cos_tilt else c.cos_tilt,
+        new.vz if crossed else c.vz,
     )
-    scatter(b, LANE_AT.crossing, i, lanes, select(crossed, noted, c))
+    scatter(b, LANE_AT.crossing, i, lanes, noted)
 
 
 @inlined
@@ -217,21 +227,21 @@ def advance(b, lanes, obstacles, closest, count, model, first, last, ticks):
     """
     inverse_substeps = 1.0 / (ticks * SUBSTEPS)
     inverse_period = 1.0 / (ticks * TICK)
-    # all lanes; were it a constant to LLVM, short loops would be unrolled to scalars before they could be vectorised
+    # all lanes; were it a constant to LLVM, it would unroll the short loops to scalars before it could vectorise them
     width = lanes if lanes == 1 or ticks > 0 else 0
     for tick in range(first, last):
         for i in range(width):
             begin_tick(b, i, lanes)
         for sub in range(SUBSTEPS):
             fraction = (tick * SUBSTEPS + sub + 1) * inverse_substeps
-            for i in range(width):
+            for i in range(lanes):
                 substep(b, i, lanes, fraction, inverse_period, model)
         for i in range(width):
             measure_path(b, i, lanes)
         for j in range(count):
             for i in range(width):
                 sweep(b, i, lanes, j, obstacles, closest, model.vehicle.radius)
-        for i in range(width):
+        for i in range(lanes):
             end_tick(b, i, lanes, model.world)
         log_crossings(b, lanes)
 

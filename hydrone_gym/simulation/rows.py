@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym._memory import call, gather, pointer, scatter
 from hydrone_gym.physics.trigonometry import wrap
-from hydrone_gym.simulation.storage import AT, CROSSINGS, LANE_AT, LOG, LOG_ENTRY, LOGGED_CROSSINGS, REFERENCE, Pose
+from hydrone_gym.simulation.storage import (
+    AT,
+    CROSSINGS,
+    LANE_AT,
+    LOG,
+    LOG_ENTRY,
+    LOGGED_CROSSINGS,
+    REFERENCE,
+    Pose,
+    Row,
+)
 
 
 class Engine(NamedTuple):
@@ -55,14 +65,14 @@ def advance_rows(engine, rows, references, obstacles, closest, count, first, las
             # lanes beyond the last row repeat it and are thrown away
             row = min(start + i, n - 1)
             source = pointer(rows[row])
-            for c in range(LOG + logged(source)):
+            scatter(b, 0, i, lanes, gather(source, 0, 0, 1, Row))
+            for c in range(LOG, LOG + logged(source)):
                 b[c * lanes + i] = source[c]
             set_move(b, i, lanes, gather(references[row], 0, 0, 1, Pose))
         call(engine.address, engine.block, obstacles[k], closest[k], engine.values, count, first, last, engine.ticks)
         for i in range(min(lanes, n - start)):
             target = pointer(rows[start + i])
-            for c in range(LOG):
-                target[c] = b[c * lanes + i]
+            scatter(target, 0, 0, 1, gather(b, 0, i, lanes, Row))
             for c in range(LOG, LOG + logged(target)):
                 target[c] = b[c * lanes + i]
             if last == engine.ticks:
