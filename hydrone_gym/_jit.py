@@ -11,6 +11,7 @@ cache. Three rules hold everywhere and are the reason for this file:
 Kernels read and write what they work on through `hydrone_gym._memory`.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -24,7 +25,13 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import sigutils
+from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
+
+try:
+    import fcntl
+except ImportError:  # Windows: processes that start together compile the same thing
+    fcntl = None  # type: ignore[assignment]
 
 _ROOT = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(r"^\s*from ((?:hydrone_gym|planners|agents)[\w.]*) import (.*)$", re.MULTILINE)
@@ -81,14 +88,46 @@ def cache_root() -> Path | None:
     return None
 
 
-def _cached(compiled: Any, *modules: str) -> Any:
+class _SharedCache(FunctionCache):
+    """A cache whose functions one process compiles while others wait for them: so several compile in parallel."""
+
+    def __init__(self, function: Callable) -> None:
+        """Begin without the lock."""
+        super().__init__(function)
+        self._lock: Any = None
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is stored; if nothing is, hold the lock until it is, or wait for who holds it."""
+        found = super().load_overload(sig, target_context)
+        if found is None and fcntl is not None and self._lock is None:
+            with contextlib.suppress(OSError):
+                Path(self.cache_path).mkdir(parents=True, exist_ok=True)
+                self._lock = open(Path(self.cache_path, f"{self._name}.lock"), "w")  # noqa: SIM115  held while compiling
+                fcntl.flock(self._lock, fcntl.LOCK_EX)
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                self._release()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store a function and let the others have it."""
+        super().save_overload(sig, data)
+        self._release()
+
+    def _release(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+
+def _cached(compiled: Any, function: Callable, *modules: str) -> Any:
     """Let a compiled function keep its machine code on disk, under the fingerprint of modules."""
     root = cache_root()
     if root is not None:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(root / _fingerprint(*modules))
         try:
-            compiled.enable_caching()
+            compiled._cache = _SharedCache(function)
         finally:
             numba.config.CACHE_DIR = before
     return compiled
@@ -96,7 +135,7 @@ def _cached(compiled: Any, *modules: str) -> Any:
 
 def kernel(function: Callable) -> Any:
     """Compile an entry point: a function that Python calls, cached on disk."""
-    return _cached(numba.njit(**_OPTIONS)(function), function.__module__)
+    return _cached(numba.njit(**_OPTIONS)(function), function, function.__module__)
 
 
 def unit(signature: Any, function: Callable, *modules: str) -> Any:
@@ -110,7 +149,7 @@ def unit(signature: Any, function: Callable, *modules: str) -> Any:
         modules: under whose fingerprint it is cached; they import everything that the function uses.
     """
     unit = CFunc(function, sigutils.normalize_signature(signature), {}, _OPTIONS)
-    _cached(unit, *modules).compile()
+    _cached(unit, function, *modules).compile()
     return unit
 
 

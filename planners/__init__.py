@@ -1,5 +1,6 @@
-"""Planners: policies that look ahead with the environment's own model."""
+"""Planners: policies that look ahead with the model they believe in, and the shield that checks any policy with it."""
 
+from planners.belief import Belief
 from planners.cl_rrt.memory import Memory, Report
 from planners.cl_rrt.policy import CLRRT
 from planners.cl_rrt.settings import CLRRTSettings
@@ -10,11 +11,13 @@ from planners.policy import Known, PlannerPolicy
 from planners.potential_field import PotentialField
 from planners.published import PublishedCLRRT
 from planners.recording import TreeRecorder
+from planners.shield import Shield
 from planners.straight_line import StraightLine
 
 __all__ = [
     "CLRRT",
     "MPPI",
+    "Belief",
     "CLRRTSettings",
     "Known",
     "Memory",
@@ -23,6 +26,7 @@ __all__ = [
     "PotentialField",
     "PublishedCLRRT",
     "Report",
+    "Shield",
     "StraightLine",
     "TreeRecorder",
     "TreeView",

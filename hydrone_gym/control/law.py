@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from hydrone_gym._jit import inlined
-from hydrone_gym._memory import select
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.control.reference import Integral, clamp
 from hydrone_gym.vehicle import Vehicle
