@@ -59,9 +59,9 @@ class PlannerPolicy:
     state can be used again.
     """
 
-    def __init__(self, belief: Belief | Any, **options: Any) -> None:
-        """Take what to believe, a `Belief` or any model with vehicle, world and period."""
-        raise NotImplementedError(f"{type(self).__name__} must define __init__(belief, ...)")
+    def __init__(self, belief: Belief | Any = None) -> None:
+        """Keep what to believe, a `Belief` or any model with vehicle, world and period; None for planners without."""
+        self.belief = None if belief is None else Belief.of(belief)
 
     @classmethod
     def for_env(cls, env: Any, *, belief: Belief | Literal["truth"] | None = None, **options: Any) -> Self:
@@ -75,7 +75,8 @@ class PlannerPolicy:
         Raises:
             TypeError: anything that is not a HyDrone environment, or an option that the class does not have.
         """
-        return cls(belief_of(env, belief), **options)
+        make: Any = cls
+        return make(belief_of(env, belief), **options)
 
     def act(self, now: Known, memory: Any) -> tuple[NDArray[np.float64], Any]:
         """Return the reference (4,) for the next period and the new memory; memory is None when an episode starts."""

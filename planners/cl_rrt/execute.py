@@ -19,7 +19,7 @@ from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
 from planners.cl_rrt.settings import SettingParams
-from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, Planner, node_state, prune_orphans, reroot
+from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, ROOT, Planner, node_state, prune_orphans, reroot
 from planners.clearance import clearance_between
 from planners.stop_check import (
     Check,
@@ -119,7 +119,7 @@ def trim(p, size):
     while end > 0:
         p.nodes[end].dead = 0
         end = p.nodes[end].parent
-    return reroot(p.nodes, size, 0, p.path)
+    return reroot(p.nodes, size, ROOT, p.path)
 
 
 @inlined

@@ -12,10 +12,11 @@ from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.storage import VESSEL, Flown
 from planners.stop_check import Check, state_of
 
-# What a node is part of
-OPEN = 0  # ordinary: may be extended, can stop here
-SETTLING = 1  # coming to rest before a crossing: can still stop
-CROSSING = 2  # inside a crossing: the only way to stop is to finish it
+# What a node is part of. Plain numbers would be literals, and Numba compiles what is handed one anew for each of them.
+OPEN = np.int64(0)  # ordinary: may be extended, can stop here
+SETTLING = np.int64(1)  # coming to rest before a crossing: can still stop
+CROSSING = np.int64(2)  # inside a crossing: the only way to stop is to finish it
+ROOT = np.int64(0)  # the root's number
 
 NODE = np.dtype(
     [
@@ -103,10 +104,10 @@ def reroot(nodes, size, root, path):
     for i in range(size):
         path[i] = -1
     path[root] = 0
-    copy_node(nodes, root, 0)
+    copy_node(nodes, root, ROOT)
     nodes[0].parent = -1
     nodes[0].time, nodes[0].cost = 0.0, 0.0
-    kept = 1
+    kept = ROOT + 1
     for i in range(root + 1, size):
         parent = path[nodes[i].parent]
         if parent >= 0 and not nodes[i].dead:
