@@ -21,21 +21,12 @@ _MARGIN = 0.97  # of the picture that the box may fill
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """What a picture is like; see the docstring of `HydroneEnv`.
+    """What a picture is like; ValueError for a value out of range names the option, its rule and the value."""
 
-    Attributes:
-        size: width and height, pixels; even, as video codecs demand.
-        camera: "overview" or "chase".
-
-    Raises:
-        ValueError: a value out of range, naming the option, its rule and the value.
-    """
-
-    size: tuple[int, int] = (640, 480)
-    camera: str = "overview"
+    size: tuple[int, int] = (640, 480)  # width and height, pixels; even, as video codecs demand
+    camera: str = "overview"  # or "chase"
 
     def __post_init__(self) -> None:
-        """Check every option."""
         if self.camera not in CAMERAS:
             raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
         rule = f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels)"
@@ -85,12 +76,9 @@ def axes(azimuth: float, elevation: float) -> NDArray[np.float64]:
 
 
 def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, aspect: float) -> Pose:
-    """Return the nearest camera that sees all of some points.
+    """Return the nearest camera that sees all of some points (n, 3) m; it stands at these angles, degrees, from them.
 
-    Args:
-        corners: (n, 3) m.
-        azimuth, elevation: where it stands as seen from the points, degrees.
-        aspect: width by height of the picture.
+    `aspect` is width by height of the picture.
     """
     pose = looking(-axes(azimuth, elevation)[2], np.zeros(3), FIELD_OF_VIEW)
     tangent = np.tan(np.radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
@@ -116,13 +104,10 @@ def beside(world: World, start: ArrayLike, goal: ArrayLike, aspect: float) -> Po
 
 
 def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:
-    """Return the camera that follows a vehicle.
+    """Return the camera that follows a vehicle, which was at `path` (N, 3) m at every tick.
 
-    It stands behind and above as the vehicle has been moving lately, which turns slowly, whatever the heading.
-
-    Args:
-        path: (N, 3) where the vehicle was at every tick, m.
-        goal: (3,) m: what it looks towards before the vehicle has moved.
+    It stands behind and above as the vehicle has been moving lately, which turns slowly, whatever the heading. Before
+    the vehicle has moved it looks towards the goal (3,) m.
     """
     moves = np.diff(path[:, :2], axis=0)
     recent = np.exp(-_TICKS_REMEMBERED * np.arange(len(moves))[::-1])
@@ -139,17 +124,9 @@ def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:
 def outlines(
     pose: Pose, ends: NDArray[np.float64], radii: NDArray[np.float64], size: tuple[int, int], tile: int
 ) -> NDArray[np.int64]:
-    """Return the tiles that shapes can reach in a picture.
+    """Return the tiles of a picture that shapes can reach: (n, 4) first column and row, last of each, excluded.
 
-    Args:
-        pose: the camera.
-        ends: (n, 2, 3) two points of each shape, m; it lies in the hull of the balls around them.
-        radii: (n,) of those balls, m.
-        size: (width, height) of the picture, pixels.
-        tile: pixels a tile.
-
-    Returns:
-        (n, 4) int64: first column and row, last column and row of tiles, the last excluded.
+    A shape lies in the hull of two balls: `ends` (n, 2, 3) and `radii` (n,) in m. `size` and `tile` are in pixels.
     """
     width, height = size
     offsets = ends - pose.eye

@@ -24,16 +24,9 @@ _LABELS = 16  # captions that are kept: pictures of about the same time share on
 
 
 class Painter:
-    """Paints moments of one world with one vehicle.
-
-    Args:
-        view: size and camera.
-        world: bounds, transition zone and what counts as arrival.
-        vehicle: its arms are drawn as long as they are, times a scale for the overview.
-    """
+    """Paints moments of one world with one vehicle, whose arms are as long as they are, times a scale for the overview."""
 
     def __init__(self, view: View, world: World, vehicle: Vehicle) -> None:
-        """Work out what stays the same."""
         self.view, self.world, self.vehicle = view, world, vehicle
         self._canvas = Canvas(view.size)
 
