@@ -24,7 +24,7 @@ _LABELS = 16  # captions that are kept: pictures of about the same time share on
 
 
 class Painter:
-    """Paints moments of one world with one vehicle, whose arms are as long as they are, times a scale for the overview."""
+    """Paints moments of one world with one vehicle, larger than it is from the overview."""
 
     def __init__(self, view: View, world: World, vehicle: Vehicle) -> None:
         self.view, self.world, self.vehicle = view, world, vehicle
@@ -58,18 +58,17 @@ class Painter:
         """Everything that is drawn; `unit` (m) is a pixel at the path."""
         now = moment.ticks[-1]
         end, sent = (self._unit(pose, point) for point in (moment.goal, now[12:15]))
-        return np.vstack(
-            (
-                shapes.obstacles(moment.obstacles, moment.detected, self._veiled(moment, pose)),
-                shapes.vehicle(now[:12], self.vehicle.arm, scale),
-                shapes.shadow(now[:3], self.world.lower[2], 1.15 * scale * self.vehicle.radius),
-                shapes.path(moment.ticks[:, :3], max(0.02, 1.6 * unit)),
-                shapes.plumb(now[:3], 0.8 * unit),
-                shapes.plumb(moment.goal, 0.8 * end),
-                shapes.goal(moment.goal, self.world.goal_radius, pose, max(0.35, 8.0 * end), 1.6 * end),
-                shapes.reference(now[12:15], pose, max(0.15, 4.5 * sent), max(0.014, 1.1 * sent)),
-            )
+        parts = (
+            shapes.obstacles(moment.obstacles, moment.detected, self._veiled(moment, pose)),
+            shapes.vehicle(now[:12], self.vehicle.arm, scale),
+            shapes.shadow(now[:3], self.world.lower[2], 1.15 * scale * self.vehicle.radius),
+            shapes.path(moment.ticks[:, :3], max(0.02, 1.6 * unit)),
+            shapes.plumb(now[:3], 0.8 * unit),
+            shapes.plumb(moment.goal, 0.8 * end),
+            shapes.goal(moment.goal, self.world.goal_radius, pose, max(0.35, 8.0 * end), 1.6 * end),
+            shapes.reference(now[12:15], pose, max(0.15, 4.5 * sent), max(0.014, 1.1 * sent)),
         )
+        return np.vstack(parts)
 
     def _veiled(self, moment: Moment, pose: Pose) -> NDArray[np.bool_]:
         """Which obstacles would hide the vehicle from a camera that follows it (M,); the overview hides nothing."""

@@ -202,8 +202,8 @@ class Canvas:
     def _cast(self, shapes: NDArray[np.float64], pose: Pose) -> Seen:
         """Paint a picture, over the one without shapes if that is known."""
         width, height = self.size
-        blank = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64)
-        image, marks = blank if self._still is None else (part.copy() for part in self._still)
+        still, seen = self._still or (np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64))
+        image, marks = still.copy(), seen.copy()
         ends = np.stack((shapes[:, 1:4], np.where(shapes[:, :1] == CAPSULE, shapes[:, 4:7], shapes[:, 1:4])), axis=1)
         tiles = _sort_into_tiles(outlines(pose, ends, shapes[:, 7], self.size, TILE), self.size)
         known, found = self._still is not None, np.empty((_LAYERS, 2))

@@ -47,32 +47,25 @@ class Mesh(NamedTuple):
 
 
 class Stage:
-    """A mission as a viser scene.
-
-    Args:
-        scene: of a viser server, empty.
-        moment: the mission; only what never changes about it is used.
-        simulation: that of the flight, for its world, vehicle and period.
-    """
+    """A mission as a viser scene: it begins with all that stands still, and with what moves where it begins."""
 
     def __init__(self, scene: Any, moment: Moment, simulation: Simulation) -> None:
-        """Add everything that stands still, and what moves where it begins."""
         self._scene, self._world = scene, simulation.world
         self._middles, self._sizes = placed(moment.obstacles)
         self._vehicle = scene.add_frame("/vehicle", show_axes=False)
         for name, colour in (("frame", _ARM), ("front", style.RED), ("rotors", _ROTOR)):
             self._mesh(f"/vehicle/{name}", model(shapes.MODEL[name], simulation.vehicle.arm * VEHICLE_SCALE), colour)
         self._reference = self._mesh("/reference", ball(0.14, rings=8), style.BLACK)
-        (x0, y0, bottom), (x1, y1, top) = simulation.world.lower, simulation.world.upper
-        x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        (_, _, bottom), (_, _, top) = self._world.lower, self._world.upper
+        x, y, _ = 0.5 * np.add(self._world.lower, self._world.upper)
         # on top of the box it is in view and in nobody's way
         self._label = scene.add_label("/label", "", position=(x, y, top), anchor="center-center", font_screen_scale=1.2)
         self._plumb = self._lines("/plumb", np.zeros((1, 2, 3)), "#5d6f7d", 1.0)
         self._trees: dict[str, Any] = {}
         self._path: Any = None
-        self._add_marks(moment, simulation.world)
-        self._add_box(simulation.world)
-        self._add_water(simulation.world)
+        self._add_marks(moment, self._world)
+        self._add_box(self._world)
+        self._add_water(self._world)
         dry = in_air(self._middles[:, 2])
         self._known = self._bodies("/obstacles/detected", dry | True, DETECTED)
         self._unknown = self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom))
@@ -96,12 +89,11 @@ class Stage:
         """Show the tree of a period, and the path in it."""
         edges, followed = np.round(_FINE * tree.edges) / _FINE, np.zeros(len(tree.edges), bool)
         followed[tree.path] = True
-        parts = {
-            "/tree/air": (tree.air & ~followed, style.RED, 1.0),
-            "/tree/water": (~tree.air & ~followed, style.PURPLE, 1.0),
-            "/tree/plan": (followed, style.BLACK, 2.0),
-        }
-        for name, (chosen, colour, width) in parts.items():
+        for name, chosen, colour, width in (
+            ("/tree/air", tree.air & ~followed, style.RED, 1.0),
+            ("/tree/water", ~tree.air & ~followed, style.PURPLE, 1.0),
+            ("/tree/plan", followed, style.BLACK, 2.0),
+        ):
             # three.js cannot draw no edges: without one, what is there is not seen
             points = edges[chosen] if chosen.any() else np.zeros((1, 2, 3))
             if name in self._trees:
@@ -210,9 +202,6 @@ def walls(lower: ArrayLike, upper: ArrayLike, low: float, high: float) -> list[M
 
 def model(rows: NDArray[np.float64], size: float) -> Mesh:
     """Return capsules and discs of the ray caster as rods, so many times as large."""
-    rods = []
-    for row in rows:
-        a, b = row[1:4], row[4:7]
-        ends = (a, b) if row[0] == CAPSULE else (a - _THICK * b, a + _THICK * b)
-        rods.append(rod(size * ends[0], size * ends[1], size * row[7], 20))
-    return Mesh.joined(*rods)
+    a, b, discs = size * rows[:, 1:4], size * rows[:, 4:7], rows[:, :1] != CAPSULE
+    starts, ends = np.where(discs, a - _THICK * b, a), np.where(discs, a + _THICK * b, b)
+    return Mesh.joined(*(rod(*each, 20) for each in zip(starts, ends, size * rows[:, 7])))
