@@ -72,11 +72,10 @@ def span_of(camera, box, d):
     z_in, z_out = _cut(camera.eye[2], by[2], box.lower[2], box.upper[2] + reach)
     dive, rise = _cut(camera.eye[2], by[2], box.lower[2], 0.0)
     side_in, side_out = max(x_in, y_in), min(x_out, y_out)
-    enter, leave = max(side_in, z_in), min(side_out, z_out)
     enter_axis = 2 if z_in > side_in else (0 if x_in > y_in else 1)
     leave_axis = 2 if z_out < side_out else (0 if x_out < y_out else 1)
     dive, rise = max(max(dive, side_in), 0.0), min(rise, side_out)
-    return Span(enter, leave, enter_axis, leave_axis, dive, rise, by)
+    return Span(max(side_in, z_in), min(side_out, z_out), enter_axis, leave_axis, dive, rise, by)
 
 
 @inlined

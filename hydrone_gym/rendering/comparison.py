@@ -42,9 +42,9 @@ def plot_success(rates: Rates, *, title: str = "") -> Figure:
     """Draw the share of each policy that arrived as a bar with its interval, from 0 to 1; None where it did not fly."""
     with _panel(rates, title) as (figure, axes):
         for row, entry in enumerate(rates.values()):
-            value, low, high = entry or (None, None, None)
-            if value is None:
+            if entry is None:
                 continue
+            value, low, high = entry
             axes.barh(row, 100.0 * value, 0.62, color=colour(row), edgecolor=_EDGE, linewidth=0.7)
             if low is not None and high is not None:
                 _interval(axes, row, 100.0 * low, 100.0 * high)

@@ -148,15 +148,12 @@ def _look(place, shapes, items, tile, found, pixel, fine, known):
 
 @kernel
 def cast(image, marks, known, place, shapes, begins, items, found):
-    """Paint a picture.
+    """Paint an image (height, width, 3) uint8, and marks (height, width) int64, what each pixel sees.
 
     Args:
-        image: (height, width, 3) uint8, written.
-        marks: (height, width) int64, what each pixel sees, written.
         known: whether image and marks hold the picture without shapes; the result is the same.
         place: a `Camera` and a `Box`.
-        shapes: float64, from `prepare`.
-        begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
+        shapes, begins, items: from `prepare` and `_sort_into_tiles`.
         found: (k, 2) float64, working storage: the most translucent things kept along one ray.
     """
     height, width = marks.shape

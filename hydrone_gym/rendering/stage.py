@@ -67,9 +67,16 @@ class Stage:
         self._add_box(self._world)
         self._add_water(self._world)
         dry = in_air(self._middles[:, 2])
-        self._known = self._bodies("/obstacles/detected", dry | True, DETECTED)
-        self._unknown = self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom))
-        self._unknown += self._bodies("/obstacles/unknown, in the air", dry, UNKNOWN, (x, y, 0.5 * top))
+        groups = (
+            ("detected", dry | True, True, None),
+            ("unknown, under water", ~dry, False, (x, y, 0.5 * bottom)),
+            ("unknown, in the air", dry, False, (x, y, 0.5 * top)),
+        )
+        self._obstacles = [
+            (self._bodies(f"/obstacles/{name}", chosen, origin), chosen, known)
+            for name, chosen, known, origin in groups
+            if chosen.any()
+        ]
 
     def show(self, moment: Moment) -> None:
         """Move to a moment; to be called for every tick in order."""
@@ -80,10 +87,9 @@ class Stage:
         self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
         self._label.text = ", ".join(moment.words(self._world.zone))
         self._grow(moment.ticks[:, :3])
-        for group, there in ((self._known, moment.detected), (self._unknown, ~moment.detected)):
-            scales = np.where(there, self._sizes, _GONE).astype(np.float32)
-            for bodies, chosen in group:
-                bodies.batched_scales = scales[chosen]
+        for bodies, chosen, known in self._obstacles:
+            scales = np.where(moment.detected == known, self._sizes, _GONE)
+            bodies.batched_scales = scales[chosen].astype(np.float32)
 
     def plan(self, tree: Tree) -> None:
         """Show the tree of a period, and the path in it."""
@@ -104,14 +110,11 @@ class Stage:
 
     def _grow(self, path: NDArray[np.float64]) -> None:
         """Add the last tick to the path."""
-        ticks = len(path) - 1
-        if ticks == 0:
-            return
-        first = (ticks - 1) // _CHUNK * _CHUNK
+        first = max(len(path) - 2, 0) // _CHUNK * _CHUNK
         edges = np.stack((path[first:-1], path[first + 1 :]), axis=1)
-        if ticks - first == 1:
+        if len(edges) == 1:
             self._path = self._lines(f"/path/{first}", edges, style.RED, 4.0)
-        else:
+        elif len(edges):
             self._path.points = edges.astype(np.float32)
 
     def _add_marks(self, moment: Moment, world: World) -> None:
@@ -147,18 +150,13 @@ class Stage:
             for k, wall in enumerate(walls(lower, upper, low, high)):
                 self._mesh(f"/{name} {k}", wall, colour, opacity=opacity, side="double")
 
-    def _bodies(
-        self, name: str, chosen: NDArray[np.bool_], colour: str, origin: tuple[float, float, float] | None = None
-    ) -> list[tuple[Any, NDArray[np.bool_]]]:
-        """Add some of the obstacles in one look, if any, none of them there yet; with an origin (m) they are glass."""
-        if not chosen.any():
-            return []
+    def _bodies(self, name: str, chosen: NDArray[np.bool_], origin: tuple[float, float, float] | None) -> Any:
+        """Add some of the obstacles, none of them there yet; with an origin (m) they are glass."""
         count, middle = int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
         place = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), self._middles[chosen] - middle
-        look: dict[str, Any] = {"batched_colors": style.rgb(colour), "opacity": origin and _GLASS, "lod": "off"}
-        look |= {"batched_scales": np.full(count, _GONE), "position": middle, **_SHADELESS}
-        bodies = self._scene.add_batched_meshes_simple(name, *mesh(UNIT), *place, **look)
-        return [(bodies, chosen)]
+        look: dict[str, Any] = {"batched_colors": style.rgb(UNKNOWN if origin else DETECTED), "lod": "off"}
+        look |= {"batched_scales": np.full(count, _GONE), "position": middle, "opacity": origin and _GLASS}
+        return self._scene.add_batched_meshes_simple(name, *mesh(UNIT), *place, **look, **_SHADELESS)
 
     def _mesh(self, name: str, part: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
         """Add a mesh; one that is translucent has its origin in its middle."""
