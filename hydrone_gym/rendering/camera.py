@@ -128,25 +128,15 @@ def outlines(
 
     A shape lies in the hull of two balls: `ends` (n, 2, 3) and `radii` (n,) in m. `size` and `tile` are in pixels.
     """
-    width, height = size
-    offsets = ends - pose.eye
-    depth = offsets @ pose.forward
-    r = radii[:, None]
-    gap = depth**2 - r**2
-    near = depth <= 1.001 * r
-    safe = np.where(near, 1.0, gap)
-    lows, highs = [], []
-    for axis, middle, sign in ((pose.right, 0.5 * width, 1.0), (pose.up, 0.5 * height, -1.0)):
-        side = sign * (offsets @ axis)
-        # tangents from the eye to the ball, in the plane of this axis and the depth
-        root = r * np.sqrt(np.maximum(side**2 + gap, 0.0))
-        low = (side * depth - root) / safe / pose.pixel(height) + middle
-        high = (side * depth + root) / safe / pose.pixel(height) + middle
-        count = -(-int(2.0 * middle) // tile)
-        first = np.floor((np.where(near, -np.inf, low).min(axis=1) - 1.0) / tile)
-        last = np.floor((np.where(near, np.inf, high).max(axis=1) + 1.0) / tile) + 1.0
-        lows.append(np.clip(first, 0, count))
-        highs.append(np.clip(last, 0, count))
-    tiles = np.stack((*lows, *highs), axis=1).astype(np.int64)
+    offsets, r = ends - pose.eye, radii[:, None]
+    side, depth = np.stack((offsets @ pose.right, -(offsets @ pose.up))), offsets @ pose.forward
+    near, gap = depth <= 1.001 * r, depth**2 - r**2
+    # tangents from the eye to the ball, in the planes of depth and columns, and of depth and rows
+    root = r * np.sqrt(np.maximum(side**2 + gap, 0.0))
+    scale, middle = np.where(near, 1.0, gap) * pose.pixel(size[1]), 0.5 * np.reshape(size, (2, 1, 1))
+    low = np.where(near, -np.inf, (side * depth - root) / scale + middle).min(axis=2) - 1.0
+    high = np.where(near, np.inf, (side * depth + root) / scale + middle).max(axis=2) + 1.0
+    reach = np.vstack((np.floor(low / tile), np.floor(high / tile) + 1.0)).T
+    tiles = np.clip(reach, 0.0, np.tile(np.ceil(np.divide(size, tile)), 2)).astype(np.int64)
     tiles[(depth + r <= 0.0).all(axis=1)] = 0  # wholly behind the eye
     return tiles

@@ -30,15 +30,13 @@ _RIM: dict[str, Any] = {"markeredgecolor": _EDGE, "markeredgewidth": 0.5}
 _MUTED = "#5a6570"
 _LABEL, _TITLE = 22, 44  # characters that fit
 
-Rates = Mapping[str, tuple[float, float | None, float | None] | None]
-
 
 def colour(index: int) -> str:
     """Return the colour of the policy with this number, from 0; they begin again after eight."""
     return COLOURS[index % len(COLOURS)]
 
 
-def plot_success(rates: Rates, *, title: str = "") -> Figure:
+def plot_success(rates: Mapping[str, tuple[float, float | None, float | None] | None], *, title: str = "") -> Figure:
     """Draw the share of each policy that arrived as a bar with its interval, from 0 to 1; None where it did not fly."""
     with _panel(rates, title) as (figure, axes):
         for row, entry in enumerate(rates.values()):

@@ -78,7 +78,7 @@ def load_viser() -> Any:
 def write_replay(
     flight: Flown, simulation: Simulation, path: str | Path, *, title: str, trees: Sequence[Tree] = ()
 ) -> None:
-    """Write a flight as a page that plays at the speed at which it was flown.
+    """Write a flight as a page that plays as fast as it was flown; DependencyNotInstalled without the extra `replay`.
 
     Args:
         flight: from `hydrone_gym.evaluation.fly`.
@@ -112,12 +112,9 @@ def write_replay(
 def _camera_poses(moment: Moment, world: World) -> list[_Fitted]:
     """Return cameras beside the way from start to goal, for windows from narrow to wide."""
     middle = 0.5 * np.add(world.lower, world.upper)
-    poses = []
-    for aspect in _ASPECTS:
-        pose = beside(world, moment.ticks[0, :3], moment.goal, aspect)
-        depth = float((middle - pose.eye) @ pose.forward)
-        poses.append((aspect, pose.eye, pose.eye + depth * pose.forward))
-    return poses
+    poses = [beside(world, moment.ticks[0, :3], moment.goal, aspect) for aspect in _ASPECTS]
+    turned = [pose.eye + float((middle - pose.eye) @ pose.forward) * pose.forward for pose in poses]
+    return [(aspect, pose.eye, point) for aspect, pose, point in zip(_ASPECTS, poses, turned, strict=True)]
 
 
 def _dressed(page: str, title: str, last: Moment, world: World, poses: list[_Fitted], *, trees: bool) -> str:

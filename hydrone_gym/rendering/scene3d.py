@@ -40,7 +40,6 @@ class Scene:
     """A box of the world between two corners (m), seen from an azimuth (degrees), to which objects are added."""
 
     def __init__(self, lower: Sequence[float], upper: Sequence[float], azimuth: float = -60.0) -> None:
-        import mpl_toolkits.mplot3d  # noqa: F401  (registers the projection)
         from matplotlib import rc_context
         from matplotlib.figure import Figure
 
