@@ -13,8 +13,7 @@ def draw_flight(flight: Flight, simulation: Simulation, directory: Path, name: s
     `simulation` is that of the environment it was flown in; `name` begins the name of every file in the existing
     `directory`, and with a capital letter every title.
     """
-    from hydrone_gym.rendering.figures import plot_path, save_figure
-    from hydrone_gym.rendering.histories import plot_attitude, plot_position
+    from hydrone_gym.rendering.figures import plot_attitude, plot_path, plot_position, save_figure
 
     times, states, references = flight.trace
     world, goal = simulation.world, flight.scenario.goal

@@ -14,7 +14,6 @@ _BELOW = (0.74, 0.79, 0.84)
 _SAND = (0.87, 0.81, 0.68)
 _LINE = (0.45, 0.50, 0.55)
 
-
 Point = tuple[float, float, float]
 
 
@@ -39,10 +38,7 @@ class Box(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Where a ray is inside the box and under water (lengths along it), and the axes of the walls it passes.
-
-    Then one by each part of its direction, as divisions take long.
-    """
+    """Where a ray is inside the box and under water (lengths along it), and the axes of the walls it passes."""
 
     enter: float
     leave: float
@@ -50,7 +46,7 @@ class Span(NamedTuple):
     leave_axis: int
     dive: float
     rise: float
-    by: Point
+    by: Point  # one by each part of its direction, as divisions take long
 
 
 @inlined
@@ -76,28 +72,23 @@ def span_of(camera, box, d):
     z_in, z_out = _cut(camera.eye[2], by[2], box.lower[2], box.upper[2] + reach)
     dive, rise = _cut(camera.eye[2], by[2], box.lower[2], 0.0)
     side_in, side_out = max(x_in, y_in), min(x_out, y_out)
-    enter, leave = max(side_in, z_in), min(side_out, z_out)
     enter_axis = 2 if z_in > side_in else (0 if x_in > y_in else 1)
     leave_axis = 2 if z_out < side_out else (0 if x_out < y_out else 1)
     dive, rise = max(max(dive, side_in), 0.0), min(rise, side_out)
-    return Span(enter, leave, enter_axis, leave_axis, dive, rise, by)
+    return Span(max(side_in, z_in), min(side_out, z_out), enter_axis, leave_axis, dive, rise, by)
 
 
 @inlined
-def _stroke(distance, half_width, blur, t, camera, slope, across, normal):
-    """How much of a pixel a line on a plane covers.
+def _sharpness(camera, span, d, t, axis, normal):
+    """Pixels a metre along an axis of a plane where a ray meets it; the plane's normal is another axis, both 0 to 2."""
+    right, up, slope = camera.right, camera.up, d[axis] * span.by[normal]
+    wide = abs(right[axis] - slope * right[normal]) + abs(up[axis] - slope * up[normal])
+    return 1.0 / (t * camera.pixel * wide + 1e-9)
 
-    Args:
-        distance, half_width: from its middle, along one axis of the plane, and its own, m.
-        blur: no pixel is wider than this there, m.
-        t, camera: length of the ray, m, and its camera.
-        slope: the ray's part along that axis by its part along the plane's normal.
-        across, normal: the parts of the camera's right and up along that axis, and along the normal.
-    """
-    if distance > half_width + blur:
-        return 0.0
-    wide = abs(across[0] - slope * normal[0]) + abs(across[1] - slope * normal[1])
-    sharp = 1.0 / (t * camera.pixel * wide + 1e-9)
+
+@inlined
+def _stroke(distance, half_width, sharp):
+    """How much of a pixel a line covers: distance (m) from its middle, half its width (m), and pixels a metre."""
     return max(0.0, min(1.0, 0.5 + (half_width - distance) * sharp)) * min(1.0, 2.0 * half_width * sharp)
 
 
@@ -110,16 +101,12 @@ def _off_lines(value, low, high):
 
 
 @inlined
-def _level_lines(camera, box, span, d, t, half_width, blur):
+def _level_lines(camera, box, span, d, t, half_width):
     """Coverage by the grid's lines on a level plane."""
-    right, up = camera.right, camera.up
-    normal = right[2], up[2]
     x = _off_lines(camera.eye[0] + t * d[0], box.lower[0], box.upper[0])
     y = _off_lines(camera.eye[1] + t * d[1], box.lower[1], box.upper[1])
-    return max(
-        _stroke(x, half_width, blur, t, camera, d[0] * span.by[2], (right[0], up[0]), normal),
-        _stroke(y, half_width, blur, t, camera, d[1] * span.by[2], (right[1], up[1]), normal),
-    )
+    across = _stroke(x, half_width, _sharpness(camera, span, d, t, 0, 2))
+    return max(across, _stroke(y, half_width, _sharpness(camera, span, d, t, 1, 2)))
 
 
 @inlined
@@ -132,24 +119,13 @@ def _haze(box, t):
 @inlined
 def _wall(camera, box, span, axis, d, t):
     """How strongly a wall of the box is drawn at a point: (grid, edges with the waterline, transition zone)."""
-    x, y = (camera.right[0], camera.up[0]), (camera.right[1], camera.up[1])
-    by, part, along, low, top = span.by[1], d[0], camera.eye[0] + t * d[0], box.lower[0], box.upper[0]
-    if axis == 0:
-        x, y = y, x
-        by, part, along, low, top = span.by[0], d[1], camera.eye[1] + t * d[1], box.lower[1], box.upper[1]
-    z, upright = camera.eye[2] + t * d[2], (camera.right[2], camera.up[2])
-    blur = t * camera.pixel * (1.0 + abs(by))
-    side, rise = part * by, d[2] * by
-    grid = max(
-        _stroke(_off_lines(along, low, top), 0.035, blur, t, camera, side, x, y),
-        _stroke(_off_lines(z, box.lower[2], box.upper[2]), 0.035, blur, t, camera, rise, upright, y),
-    )
-    edge = max(
-        _stroke(min(abs(along - low), abs(along - top)), 0.05, blur, t, camera, side, x, y),
-        _stroke(abs(z), 0.05, blur, t, camera, rise, upright, y),
-    )
-    rim = _stroke(abs(abs(z) - box.zone), 0.03, blur, t, camera, rise, upright, y)
-    return grid, edge, max(0.35 if abs(z) < box.zone else 0.0, rim)
+    along = 1 - axis
+    x, z, low, top = camera.eye[along] + t * d[along], camera.eye[2] + t * d[2], box.lower[along], box.upper[along]
+    side, rise = _sharpness(camera, span, d, t, along, axis), _sharpness(camera, span, d, t, 2, axis)
+    level = _stroke(_off_lines(z, box.lower[2], box.upper[2]), 0.035, rise)
+    grid = max(_stroke(_off_lines(x, low, top), 0.035, side), level)
+    edge = max(_stroke(min(abs(x - low), abs(x - top)), 0.05, side), _stroke(abs(z), 0.05, rise))
+    return grid, edge, max(0.35 if abs(z) < box.zone else 0.0, _stroke(abs(abs(z) - box.zone), 0.03, rise))
 
 
 @inlined
@@ -165,7 +141,7 @@ def exit_colour(camera, box, span, d):
     if span.leave_axis == 2:
         if d[2] >= 0.0:
             return background
-        line = _level_lines(camera, box, span, d, t, 0.045, t * camera.pixel * (1.0 - span.by[2]))
+        line = _level_lines(camera, box, span, d, t, 0.045)
         return mix(mix(_SAND, _LINE, 0.55 * line), _HORIZON, _haze(box, t))
     if box.sea > 0.0:
         return background
@@ -194,10 +170,10 @@ def _swell(turns):
 def surface(camera, box, span, d, t):
     """Colour and opacity of the water's surface, more of a mirror the flatter it is looked at."""
     x, y = camera.eye[0] + t * d[0], camera.eye[1] + t * d[1]
-    blur = t * camera.pixel * (1.0 + abs(span.by[2]))
-    line = _level_lines(camera, box, span, d, t, 0.03, blur)
+    line = _level_lines(camera, box, span, d, t, 0.03)
     wave = _swell(0.30 * x + 0.17 * y) + _swell(-0.21 * x + 0.36 * y + 0.2) + _swell(0.1 * x - 0.13 * y + 0.3)
-    wave = wave * max(0.0, 1.0 - blur)  # waves that are narrower than a pixel would flicker
+    # waves that are narrower than a pixel would flicker
+    wave = wave * max(0.0, 1.0 - t * camera.pixel * (1.0 + abs(span.by[2])))
     flat = 1.0 - abs(d[2])
     mirror = 0.04 + 0.96 * flat * flat * flat * flat * flat
     colour = mix(mix((0.42, 0.75, 0.92), (0.93, 0.97, 1.0), 0.35 + 0.10 * wave), (1.0, 1.0, 1.0), 0.7 * line)

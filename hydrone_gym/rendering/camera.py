@@ -21,21 +21,12 @@ _MARGIN = 0.97  # of the picture that the box may fill
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """What a picture is like; see the docstring of `HydroneEnv`.
+    """What a picture is like; ValueError for a value out of range names the option, its rule and the value."""
 
-    Attributes:
-        size: width and height, pixels; even, as video codecs demand.
-        camera: "overview" or "chase".
-
-    Raises:
-        ValueError: a value out of range, naming the option, its rule and the value.
-    """
-
-    size: tuple[int, int] = (640, 480)
-    camera: str = "overview"
+    size: tuple[int, int] = (640, 480)  # width and height, pixels; even, as video codecs demand
+    camera: str = "overview"  # or "chase"
 
     def __post_init__(self) -> None:
-        """Check every option."""
         if self.camera not in CAMERAS:
             raise ValueError(f"camera must be one of {', '.join(map(repr, CAMERAS))}, got {self.camera!r}")
         rule = f"render_size must be two even whole numbers from {LEAST} to {MOST} (pixels)"
@@ -85,12 +76,9 @@ def axes(azimuth: float, elevation: float) -> NDArray[np.float64]:
 
 
 def overview(corners: NDArray[np.float64], azimuth: float, elevation: float, aspect: float) -> Pose:
-    """Return the nearest camera that sees all of some points.
+    """Return the nearest camera that sees all of some points (n, 3) m; it stands at these angles, degrees, from them.
 
-    Args:
-        corners: (n, 3) m.
-        azimuth, elevation: where it stands as seen from the points, degrees.
-        aspect: width by height of the picture.
+    `aspect` is width by height of the picture.
     """
     pose = looking(-axes(azimuth, elevation)[2], np.zeros(3), FIELD_OF_VIEW)
     tangent = np.tan(np.radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
@@ -116,13 +104,10 @@ def beside(world: World, start: ArrayLike, goal: ArrayLike, aspect: float) -> Po
 
 
 def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:
-    """Return the camera that follows a vehicle.
+    """Return the camera that follows a vehicle, which was at `path` (N, 3) m at every tick.
 
-    It stands behind and above as the vehicle has been moving lately, which turns slowly, whatever the heading.
-
-    Args:
-        path: (N, 3) where the vehicle was at every tick, m.
-        goal: (3,) m: what it looks towards before the vehicle has moved.
+    It stands behind and above as the vehicle has been moving lately, which turns slowly, whatever the heading. Before
+    the vehicle has moved it looks towards the goal (3,) m.
     """
     moves = np.diff(path[:, :2], axis=0)
     recent = np.exp(-_TICKS_REMEMBERED * np.arange(len(moves))[::-1])
@@ -139,37 +124,19 @@ def chase(path: NDArray[np.float64], goal: NDArray[np.float64]) -> Pose:
 def outlines(
     pose: Pose, ends: NDArray[np.float64], radii: NDArray[np.float64], size: tuple[int, int], tile: int
 ) -> NDArray[np.int64]:
-    """Return the tiles that shapes can reach in a picture.
+    """Return the tiles of a picture that shapes can reach: (n, 4) first column and row, last of each, excluded.
 
-    Args:
-        pose: the camera.
-        ends: (n, 2, 3) two points of each shape, m; it lies in the hull of the balls around them.
-        radii: (n,) of those balls, m.
-        size: (width, height) of the picture, pixels.
-        tile: pixels a tile.
-
-    Returns:
-        (n, 4) int64: first column and row, last column and row of tiles, the last excluded.
+    A shape lies in the hull of two balls: `ends` (n, 2, 3) and `radii` (n,) in m. `size` and `tile` are in pixels.
     """
-    width, height = size
-    offsets = ends - pose.eye
-    depth = offsets @ pose.forward
-    r = radii[:, None]
-    gap = depth**2 - r**2
-    near = depth <= 1.001 * r
-    safe = np.where(near, 1.0, gap)
-    lows, highs = [], []
-    for axis, middle, sign in ((pose.right, 0.5 * width, 1.0), (pose.up, 0.5 * height, -1.0)):
-        side = sign * (offsets @ axis)
-        # tangents from the eye to the ball, in the plane of this axis and the depth
-        root = r * np.sqrt(np.maximum(side**2 + gap, 0.0))
-        low = (side * depth - root) / safe / pose.pixel(height) + middle
-        high = (side * depth + root) / safe / pose.pixel(height) + middle
-        count = -(-int(2.0 * middle) // tile)
-        first = np.floor((np.where(near, -np.inf, low).min(axis=1) - 1.0) / tile)
-        last = np.floor((np.where(near, np.inf, high).max(axis=1) + 1.0) / tile) + 1.0
-        lows.append(np.clip(first, 0, count))
-        highs.append(np.clip(last, 0, count))
-    tiles = np.stack((*lows, *highs), axis=1).astype(np.int64)
+    offsets, r = ends - pose.eye, radii[:, None]
+    side, depth = np.stack((offsets @ pose.right, -(offsets @ pose.up))), offsets @ pose.forward
+    near, gap = depth <= 1.001 * r, depth**2 - r**2
+    # tangents from the eye to the ball, in the planes of depth and columns, and of depth and rows
+    root = r * np.sqrt(np.maximum(side**2 + gap, 0.0))
+    scale, middle = np.where(near, 1.0, gap) * pose.pixel(size[1]), 0.5 * np.reshape(size, (2, 1, 1))
+    low = np.where(near, -np.inf, (side * depth - root) / scale + middle).min(axis=2) - 1.0
+    high = np.where(near, np.inf, (side * depth + root) / scale + middle).max(axis=2) + 1.0
+    reach = np.vstack((np.floor(low / tile), np.floor(high / tile) + 1.0)).T
+    tiles = np.clip(reach, 0.0, np.tile(np.ceil(np.divide(size, tile)), 2)).astype(np.int64)
     tiles[(depth + r <= 0.0).all(axis=1)] = 0  # wholly behind the eye
     return tiles

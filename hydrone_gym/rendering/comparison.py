@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,9 +29,6 @@ _EDGE = "#333333"
 _RIM: dict[str, Any] = {"markeredgecolor": _EDGE, "markeredgewidth": 0.5}
 _MUTED = "#5a6570"
 _LABEL, _TITLE = 22, 44  # characters that fit
-_WHISKERS = (5, 95)  # percentiles
-
-Rates = Mapping[str, tuple[float, float | None, float | None] | None]
 
 
 def colour(index: int) -> str:
@@ -39,14 +36,8 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
-def plot_success(rates: Rates, *, title: str = "") -> Figure:
-    """Draw success rates as bars with their intervals.
-
-    Args:
-        rates: for each policy the share that arrived and both ends of its interval, from 0 to 1; None where
-            it did not fly.
-        title: shown above.
-    """
+def plot_success(rates: Mapping[str, tuple[float, float | None, float | None] | None], *, title: str = "") -> Figure:
+    """Draw the share of each policy that arrived as a bar with its interval, from 0 to 1; None where it did not fly."""
     with _panel(rates, title) as (figure, axes):
         for row, entry in enumerate(rates.values()):
             if entry is None:
@@ -56,8 +47,7 @@ def plot_success(rates: Rates, *, title: str = "") -> Figure:
             if low is not None and high is not None:
                 _interval(axes, row, 100.0 * low, 100.0 * high)
             _note(axes, row, f"{100.0 * value:.1f} %")
-        axes.set_xlim(0.0, 100.0)
-        axes.set_xlabel("flights that arrived (%)")
+        axes.set(xlim=(0.0, 100.0), xlabel="flights that arrived (%)")
     return figure
 
 
@@ -66,12 +56,7 @@ def plot_distributions(
 ) -> Figure:
     """Draw a box a policy: quartiles and median, whiskers from the 5th to the 95th percentile, single values beyond.
 
-    Args:
-        values: for each policy its values, any number of them.
-        label: of the axis, with unit.
-        title: shown above.
-        limit: value marked by a dashed line.
-        limit_label: what the line is.
+    A policy has any number of values; `label` is of the axis, with unit. A dashed line marks the limit.
     """
     with _panel(values, title) as (figure, axes):
         axes.use_sticky_edges = False  # else boxes would end at the frame
@@ -87,16 +72,10 @@ def plot_distributions(
 
 
 def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title: str = "") -> Figure:
-    """Draw success against the number of obstacles.
+    """Draw success against the number of obstacles: K counts, ascending.
 
-    Args:
-        counts: (K,) numbers of obstacles, ascending.
-        rates: for each policy (K, 3), share that arrived and both ends of its interval, from 0 to 1; NaN where it did
-            not fly.
-        title: shown above.
-
-    Raises:
-        ValueError: rates of another shape.
+    Each policy has rates (K, 3), else ValueError: the share that arrived and both ends of its interval, from 0 to 1;
+    NaN where it did not fly.
     """
     gap = float(np.diff(counts).min()) if len(counts) > 1 else 1.0
     step = 0.6 * gap / max(len(rates), 1)  # side by side, so that no interval hides another
@@ -110,22 +89,15 @@ def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title
             look |= {"linestyle": "-" if index < len(COLOURS) else "--", "linewidth": 1.6, "elinewidth": 1.2}
             reach = np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None)
             axes.errorbar(places, shares[:, 0], yerr=reach, markersize=6.5, label=shortened(policy, _LABEL), **look)
-        axes.set_xticks(counts)
         axes.set_ylim(top=102.0)
-        axes.set_xlabel("number of obstacles")
-        axes.set_ylabel("flights that arrived (%)")
+        axes.set(xticks=counts, xlabel="number of obstacles", ylabel="flights that arrived (%)")
         axes.grid(color="#e6e6e6", linewidth=0.6)
         figure.legend(loc="outside lower center", ncols=2, frameon=False, handlelength=1.6, columnspacing=1.2)
     return figure
 
 
 def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "") -> Figure:
-    """Draw times of decisions, p50 and p99 joined by a line, on a logarithmic axis.
-
-    Args:
-        times: for each policy p50 and p99, ms, positive.
-        title: shown above.
-    """
+    """Draw times of decisions, p50 and p99 of each policy (ms, positive), joined by a line, on a logarithmic axis."""
     from matplotlib.ticker import FormatStrFormatter, NullFormatter
 
     with _panel(times, title) as (figure, axes):
@@ -133,8 +105,7 @@ def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "")
         for row, (p50, p99) in enumerate(times.values()):
             axes.plot([p50, p99], [row, row], color=colour(row), linewidth=3.0, solid_capstyle="round")
             look: dict[str, Any] = {"color": colour(row), "markersize": 8, **_RIM, "markeredgewidth": 0.7}
-            axes.plot(p50, row, "o", **look)
-            axes.plot(p99, row, "D", **look)
+            axes.plot(p50, row, "o", p99, row, "D", **look)
             _note(axes, row, f"{p50:.2g} / {p99:.2g}")
         axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
         axes.xaxis.set_minor_formatter(NullFormatter())
@@ -158,14 +129,12 @@ def shortened(text: str, length: int) -> str:
     return f"{text[: kept // 2]}…{text[len(text) - kept + kept // 2 :]}"
 
 
-@contextmanager
-def _rules(salt: str = "") -> Iterator[None]:
-    """Apply the style; a dollar in the name of a policy is a dollar, and text in SVG stays text."""
+def _rules(salt: str = "") -> AbstractContextManager[None]:
+    """Return the style to be applied; a dollar in the name of a policy is a dollar, and text in SVG stays text."""
     from matplotlib import rc_context
 
     own = {"text.parse_math": False, "svg.fonttype": "none", "svg.hashsalt": f"hydrone-{salt}"}
-    with rc_context({**style.FONTS, **own}):
-        yield
+    return rc_context({**style.FONTS, **own})
 
 
 @contextmanager
@@ -195,8 +164,7 @@ def _panel(policies: Mapping[str, Any], title: str) -> Iterator[tuple[Figure, Ax
 
 def _note(axes: Axes, row: int, text: str) -> None:
     """Write a short text right of a row."""
-    place = axes.get_yaxis_transform()
-    axes.text(1.03, row, text, transform=place, va="center", ha="left", fontsize=10, color=_MUTED)
+    axes.text(1.03, row, text, transform=axes.get_yaxis_transform(), va="center", fontsize=10, color=_MUTED)
 
 
 def _interval(axes: Axes, row: int, low: float, high: float) -> None:
@@ -211,14 +179,13 @@ def _limit(axes: Axes, limit: float, label: str) -> None:
     axes.axvline(limit, color=style.RED, linewidth=1.6, linestyle="--")
     left = limit > sum(axes.get_xlim()) / 2.0
     look: dict[str, Any] = {"color": style.RED, "fontsize": 10, "ha": "right" if left else "left", "va": "top"}
-    place = (-4 if left else 4, -1)  # points
-    axes.annotate(label, (limit, 1.0), place, ("data", "axes fraction"), "offset points", **look)
+    axes.annotate(label, (limit, 1.0), (-4 if left else 4, -1), ("data", "axes fraction"), "offset points", **look)
     axes.set_ylim(bottom=axes.get_ylim()[0], top=-1.1)
 
 
 def _box(axes: Axes, row: int, numbers: NDArray[np.float64]) -> None:
     """Draw one box with its whiskers and the values beyond them."""
-    low, first, median, third, high = np.percentile(numbers, (_WHISKERS[0], 25, 50, 75, _WHISKERS[1]))
+    low, first, median, third, high = np.percentile(numbers, (5, 25, 50, 75, 95))
     for inner, outer in ((first, low), (third, high)):
         axes.plot([inner, outer], [row, row], color=_EDGE, linewidth=1.1)
         axes.plot([outer, outer], [row - 0.15, row + 0.15], color=_EDGE, linewidth=1.1)

@@ -1,4 +1,4 @@
-"""Figures in three dimensions: the executed path in its world (paper, Figs. 6 and 9) and a planner's tree (Fig. 5).
+"""Figures of a flight: its path (paper, Figs. 6 and 9), position (7, 10) and attitude (8, 11); and a tree (5).
 
 Functions take arrays in SI units and return Matplotlib figures; `save_figure` writes them as PNG and PDF. Matplotlib is
 imported when the first figure is drawn, and no display is needed.
@@ -18,16 +18,23 @@ from hydrone_gym.rendering.camera import side_azimuth
 from hydrone_gym.rendering.paths import crossing_points, dash, split_media
 from hydrone_gym.rendering.scene3d import Scene
 from hydrone_gym.rendering.track import Tree
+from hydrone_gym.surface import in_air
 from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BOX = World()  # that of the paper's experiments
 Array = NDArray[np.float64]
+Look = dict[str, Any]
 FORMATS = ("png", "pdf")
+_BOX = World()  # that of the paper's experiments
 _DASH, _GAP = 0.3, 0.21  # m: a path under water
+_LEAST_ANGLE_RANGE = 4.0  # degrees: a straight flight must not look wild
+_EXECUTED: Look = {"color": style.RED, "linewidth": 2.4}
+_REFERENCE: Look = {"color": style.BLACK, "linewidth": 1.7, "linestyle": ":"}
+_ZONE: Look = {"color": style.WATER, "linewidth": 0}
+_CROSSING: Look = {"color": style.BLUE, "linewidth": 1.2, "linestyle": "--"}
 
 
 def plot_path(
@@ -40,14 +47,9 @@ def plot_path(
     upper: tuple[float, float, float] = _BOX.upper,
     title: str = "",
 ) -> Figure:
-    """Draw an executed path in its world (paper, Figs. 6 and 9).
+    """Draw an executed path (N, 3) in its world (paper, Figs. 6 and 9), solid in air, dashed under water.
 
-    Args:
-        positions: (N, 3) m, in order of time; solid in air, dashed under water.
-        goal: (3,) m.
-        detected, undetected: (k, BODY) obstacles, black and faint.
-        lower, upper: corners of the world, m.
-        title: shown above.
+    Obstacles (k, BODY) are black where detected, else faint; `lower` and `upper` are the corners of the world, m.
     """
     scene = Scene(lower, upper, azimuth=side_azimuth(positions[0], goal))
     scene.obstacles(undetected, style.FAINT, alpha=0.55)
@@ -56,45 +58,64 @@ def plot_path(
     scene.lines(air, style.RED, 2.8, hidden=0.5)
     scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
     for number, point in enumerate(crossing_points(positions)):
-        scene.ring(point, "" if number else "crossing of the surface")
-    scene.mark(positions[0], "o", style.BLACK, 10, "start")
-    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    entries = (
-        ("path in air", {"color": style.RED, "linewidth": 2.8}, air),
-        ("path under water", {"color": style.RED, "linewidth": 2.8, "linestyle": (0, (1.6, 1.1))}, water),
-        ("detected obstacle", _ball(style.DETECTED), True),
-        ("undetected obstacle", _ball(style.FAINT), len(undetected)),
-    )
-    _legend(scene, title, [(label, look) for label, look, there in entries if there])
-    return scene.figure
+        scene.mark(point, "o", style.BLUE, 11, "" if number else "crossing of the surface", hollow=True)
+    red: Look = {"color": style.RED, "linewidth": 2.8}
+    entries = {"path in air": red} if air else {}
+    entries |= {"path under water": {**red, "linestyle": (0, (1.6, 1.1))}} if water else {}
+    entries |= {"detected obstacle": _ball(style.DETECTED)}
+    entries |= {"undetected obstacle": _ball(style.FAINT)} if len(undetected) else {}
+    return _finished(scene, title, (positions[0], goal), "start", entries)
 
 
 def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "") -> Figure:
-    """Draw a planner's tree with every obstacle known (paper, Fig. 5).
-
-    Args:
-        tree: edges in air red, those under water purple, the path to the goal black.
-        scenario, world: where it was grown.
-        title: shown above.
-    """
+    """Draw a planner's tree with every obstacle known (paper, Fig. 5), red in air, purple under water."""
     start, goal = scenario.start[:3], scenario.goal
     scene = Scene(world.lower, world.upper, azimuth=side_azimuth(start, goal))
     scene.obstacles(scenario.obstacles, style.DETECTED)
-    entries = [
-        ("branch in air", {"color": style.RED, "linewidth": 2.0}),
-        ("branch under water", {"color": style.PURPLE, "linewidth": 2.0}),
-        ("obstacle", _ball(style.DETECTED)),
-    ]
+    entries: dict[str, Look] = {
+        "branch in air": {"color": style.RED, "linewidth": 2.0},
+        "branch under water": {"color": style.PURPLE, "linewidth": 2.0},
+    }
     if len(tree.path):  # beneath the branches, which keep their colour
         solution = tree.edges[tree.path]
         scene.lines([np.concatenate((solution[:1, 0], solution[:, 1]))], style.BLACK, 4.5, lower=2)
-        entries.insert(2, ("chosen path", {"color": style.BLACK, "linewidth": 4.5}))
+        entries["chosen path"] = {"color": style.BLACK, "linewidth": 4.5}
     scene.lines(list(tree.edges[tree.air]), style.RED, 1.3)
     scene.lines(list(tree.edges[~tree.air]), style.PURPLE, 1.6)
-    scene.mark(np.asarray(start), "o", style.BLACK, 10, "start (root)")
-    scene.mark(np.asarray(goal), "X", style.PURPLE, 14, "goal")
-    _legend(scene, title, entries)
-    return scene.figure
+    return _finished(scene, title, (start, goal), "start (root)", {**entries, "obstacle": _ball(style.DETECTED)})
+
+
+def plot_position(times: Array, positions: Array, references: Array, *, zone: float = 0.8, title: str = "") -> Figure:
+    """Draw x, y, z (N, 3) over time (N,), executed and reference (paper, Figs. 7 and 10).
+
+    `zone` (m) is half the height of the transition zone: a band in z, and the time spent inside it in every panel.
+    """
+    labels = ("x (m)", "y (m)", "z (m)")
+    figure = _histories(title, times, labels, positions, references, positions[:, 2], zone)
+    figure.axes[2].axhspan(-zone, zone, alpha=0.22, **_ZONE)
+    figure.axes[2].axhline(0.0, color=style.BLUE, linewidth=1.0)
+    return figure
+
+
+def plot_attitude(
+    times: Array, attitudes: Array, references: Array, heights: Array, *, zone: float = 0.8, title: str = ""
+) -> Figure:
+    """Draw roll, pitch and yaw (N, 3) in rad over time (N,), executed and reference (paper, Figs. 8 and 11).
+
+    A reference is what the control laws track, NaN where a law has none. `heights` (N,) and half the height of the
+    transition `zone`, in m, tell when the vehicle is inside it.
+    """
+    yaw = np.unwrap(attitudes[:, 2])
+    nearest = yaw + (references[:, 2] - yaw + np.pi) % (2.0 * np.pi) - np.pi
+    executed = np.degrees(np.column_stack((attitudes[:, :2], yaw)))
+    wanted = np.degrees(np.column_stack((references[:, :2], nearest)))
+    labels = ("roll φ (°)", "pitch θ (°)", "yaw ψ (°)")
+    figure = _histories(title, times, labels, executed, wanted, heights, zone)
+    for panel in figure.axes:
+        low, high = panel.get_ylim()
+        if high - low < _LEAST_ANGLE_RANGE:
+            panel.set_ylim(0.5 * (low + high - _LEAST_ANGLE_RANGE), 0.5 * (low + high + _LEAST_ANGLE_RANGE))
+    return figure
 
 
 def save_figure(figure: Figure, path: str | Path) -> list[Path]:
@@ -107,20 +128,57 @@ def save_figure(figure: Figure, path: str | Path) -> list[Path]:
     return written
 
 
-def _legend(scene: Scene, title: str, entries: list[tuple[str, dict[str, Any]]]) -> None:
-    """Put a title and a legend below the scene: the entries, then every mark that has a label."""
+def _histories(
+    title: str, times: Array, labels: Sequence[str], executed: Array, references: Array, heights: Array, zone: float
+) -> Figure:
+    """Return three panels over time, executed red, reference dotted black, with the time in the zone and crossings."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    air, inside = in_air(heights), np.abs(heights) <= zone
+    crossings = times[1:][air[1:] != air[:-1]]
+    with rc_context(style.FONTS):
+        figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")
+        figure.suptitle(title)
+        panels = figure.subplots(3, 1, sharex=True)
+        for panel, label, flown, sent in zip(panels, labels, executed.T, references.T, strict=True):
+            panel.plot(times, flown, **_EXECUTED)
+            panel.plot(times, sent, **_REFERENCE)
+            panel.set_ylabel(label)
+            panel.grid(color="#e6e6e6", linewidth=0.6)
+            panel.set_axisbelow(True)
+            panel.fill_between(times, 0.0, 1.0, inside, transform=panel.get_xaxis_transform(), alpha=0.22, **_ZONE)
+            for time in crossings:
+                panel.axvline(time, **_CROSSING)
+        panels[-1].set(xlabel="time (s)", xlim=(times[0], times[-1]))
+        figure.align_ylabels(panels)
+        lines = {"executed": _EXECUTED, "reference": _REFERENCE, "crossing": _CROSSING}
+        handles: list[Any] = [Line2D([], [], label=label, **look) for label, look in lines.items()]
+        handles.insert(2, Patch(alpha=0.35, label="transition zone", **_ZONE))
+        figure.legend(handles=handles[: 4 if len(crossings) else 3], loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def _finished(
+    scene: Scene, title: str, ends: tuple[Sequence[float], Sequence[float]], start: str, entries: dict[str, Look]
+) -> Figure:
+    """Mark start and goal, and put a title above and a legend below: the entries, then every mark with a label."""
     from matplotlib import rc_context
     from matplotlib.lines import Line2D
 
-    marks = [line for line in scene.axes.lines if not str(line.get_label()).startswith("_") and line.get_label()]
-    handles = [Line2D([], [], label=label, **look) for label, look in entries]
+    scene.mark(ends[0], "o", style.BLACK, 10, start)
+    scene.mark(ends[1], "X", style.PURPLE, 14, "goal")
+    handles = [Line2D([], [], label=label, **look) for label, look in entries.items()]
+    handles += [line for line in scene.axes.lines if line.get_label() and not line.get_label().startswith("_")]
+    look: Look = {"ncols": 4, "frameon": False, "columnspacing": 1.4, "handlelength": 1.6}
     with rc_context(style.FONTS):
-        scene.figure.legend(
-            handles=[*handles, *marks], loc="lower center", ncols=4, frameon=False, columnspacing=1.4, handlelength=1.6
-        )
+        scene.figure.legend(handles=handles, loc="lower center", **look)
         scene.figure.suptitle(title, y=0.975)
+    return scene.figure
 
 
-def _ball(shades: tuple[str, str]) -> dict[str, Any]:
+def _ball(shades: tuple[str, str]) -> Look:
     look = {"linestyle": "none", "marker": "o", "markersize": 12, "markeredgecolor": "#888888"}
     return {**look, "markerfacecolor": shades[0]}

@@ -24,28 +24,18 @@ _LABELS = 16  # captions that are kept: pictures of about the same time share on
 
 
 class Painter:
-    """Paints moments of one world with one vehicle.
-
-    Args:
-        view: size and camera.
-        world: bounds, transition zone and what counts as arrival.
-        vehicle: its arms are drawn as long as they are, times a scale for the overview.
-    """
+    """Paints moments of one world with one vehicle, larger than it is from the overview."""
 
     def __init__(self, view: View, world: World, vehicle: Vehicle) -> None:
-        """Work out what stays the same."""
         self.view, self.world, self.vehicle = view, world, vehicle
-        self._canvas = Canvas(view.size)
+        self._canvas, self._following = Canvas(view.size), view.camera == "chase"
 
     def paint(self, moment: Moment) -> NDArray[np.uint8]:
         """Return a new picture (height, width, 3); equal moments give equal bytes."""
-        following = self.view.camera == "chase"
-        pose = self.pose(moment)
-        position = moment.ticks[-1, :3]
-        unit = self._unit(pose, position if following else np.zeros(3))
+        pose, box = self.pose(moment), Box(self.world.lower, self.world.upper, self.world.zone, float(self._following))
+        unit = self._unit(pose, moment.ticks[-1, :3] if self._following else np.zeros(3))
         widest = _VEHICLE_PIXELS * unit / (2.0 * self.vehicle.radius)
-        scale = 1.0 if following else max(_OVERVIEW_SCALE, widest)
-        box = Box(self.world.lower, self.world.upper, self.world.zone, float(following))
+        scale = 1.0 if self._following else max(_OVERVIEW_SCALE, widest)
         image = self._canvas.picture(self._shapes(moment, pose, unit, scale), pose, box)
         ground = {Outcome.RUNNING: _GROUND, Outcome.GOAL: _GOOD}.get(moment.outcome, _BAD)
         _write(image, "   ".join(moment.words(self.world.zone)), ground)
@@ -53,7 +43,7 @@ class Painter:
 
     def pose(self, moment: Moment) -> Pose:
         """Return where a picture is taken from."""
-        if self.view.camera == "chase":
+        if self._following:
             return chase(moment.ticks[:, :3], moment.goal)
         return beside(self.world, moment.ticks[0, :3], moment.goal, self.view.size[0] / self.view.size[1])
 
@@ -65,24 +55,18 @@ class Painter:
         """Everything that is drawn; `unit` (m) is a pixel at the path."""
         now = moment.ticks[-1]
         end, sent = (self._unit(pose, point) for point in (moment.goal, now[12:15]))
-        return np.vstack(
-            (
-                shapes.obstacles(moment.obstacles, moment.detected, self._veiled(moment, pose)),
-                shapes.vehicle(now[:12], self.vehicle.arm, scale),
-                shapes.shadow(now[:3], self.world.lower[2], 1.15 * scale * self.vehicle.radius),
-                shapes.path(moment.ticks[:, :3], max(0.02, 1.6 * unit)),
-                shapes.plumb(now[:3], 0.8 * unit),
-                shapes.plumb(moment.goal, 0.8 * end),
-                shapes.goal(moment.goal, self.world.goal_radius, pose, max(0.35, 8.0 * end), 1.6 * end),
-                shapes.reference(now[12:15], pose, max(0.15, 4.5 * sent), max(0.014, 1.1 * sent)),
-            )
+        veiled = gaps_along(pose.eye, now[:3], moment.obstacles) < self.vehicle.radius  # they would hide the vehicle
+        parts = (
+            shapes.obstacles(moment.obstacles, moment.detected, veiled & self._following),
+            shapes.vehicle(now[:12], self.vehicle.arm, scale),
+            shapes.shadow(now[:3], self.world.lower[2], 1.15 * scale * self.vehicle.radius),
+            shapes.path(moment.ticks[:, :3], max(0.02, 1.6 * unit)),
+            shapes.plumb(now[:3], 0.8 * unit),
+            shapes.plumb(moment.goal, 0.8 * end),
+            shapes.goal(moment.goal, self.world.goal_radius, pose, max(0.35, 8.0 * end), 1.6 * end),
+            shapes.reference(now[12:15], pose, max(0.15, 4.5 * sent), max(0.014, 1.1 * sent)),
         )
-
-    def _veiled(self, moment: Moment, pose: Pose) -> NDArray[np.bool_]:
-        """Which obstacles would hide the vehicle from a camera that follows it (M,); the overview hides nothing."""
-        if self.view.camera == "overview":
-            return np.zeros(len(moment.obstacles), bool)
-        return gaps_along(pose.eye, moment.ticks[-1, :3], moment.obstacles) < self.vehicle.radius
+        return np.vstack(parts)
 
 
 @functools.lru_cache(_LABELS)

@@ -22,6 +22,7 @@ _SURFACE, _NEAR_WALL = -1, -2
 _EMPTY = -1  # mark of a ray that met no shape and was given up
 _ABSORPTION = 0.027  # 1/m, of blue under water; twice that of green, four times that of red
 _MURK = (0.05, 0.37, 0.60)  # what water looks like when it is deep
+Seen = tuple[NDArray[np.uint8], NDArray[np.int64]]  # a picture (height, width, 3), and what its pixels see
 _CORNERS = ((-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125))  # of a pixel, for its four rays
 
 
@@ -71,8 +72,7 @@ def _meet_all(shapes, items, tile, found, d):
 def _trace(place, shapes, items, tile, found, d, known):
     """Follow one ray, unless it meets no shape and what is there without shapes is known.
 
-    Returns:
-        Red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
+    Return red, green, blue, 0 to 1, and a number that differs between things side by side, negative for none.
     """
     camera, box = place
     end, hit, count = _meet_all(shapes, items, tile, found, d)
@@ -148,15 +148,12 @@ def _look(place, shapes, items, tile, found, pixel, fine, known):
 
 @kernel
 def cast(image, marks, known, place, shapes, begins, items, found):
-    """Paint a picture.
+    """Paint an image (height, width, 3) uint8, and marks (height, width) int64, what each pixel sees.
 
     Args:
-        image: (height, width, 3) uint8, written.
-        marks: (height, width) int64, what each pixel sees, written.
         known: whether image and marks hold the picture without shapes; the result is the same.
         place: a `Camera` and a `Box`.
-        shapes: float64, from `prepare`.
-        begins, items: (tiles + 1,) and (m,) int64: where each tile's shapes begin, and the shapes, tile by tile.
+        shapes, begins, items: from `prepare` and `_sort_into_tiles`.
         found: (k, 2) float64, working storage: the most translucent things kept along one ray.
     """
     height, width = marks.shape
@@ -178,25 +175,17 @@ def cast(image, marks, known, place, shapes, begins, items, found):
 
 
 class Canvas:
-    """Makes pictures of one size; from a camera that stands still it keeps the picture without shapes.
-
-    Args:
-        size: width and height, pixels.
-    """
+    """Makes pictures of one size, in pixels; from a camera that stands still it keeps the picture without shapes."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        """Know nothing yet."""
         self.size = size
         self._place: tuple[Camera, Box] | None = None
-        self._still: tuple[NDArray[np.uint8], NDArray[np.int64]] | None = None
+        self._still: Seen | None = None
 
     def picture(self, shapes: NDArray[np.float64], pose: Pose, box: Box) -> NDArray[np.uint8]:
-        """Return a new picture (height, width, 3), the same whether or not one from there has been made before.
+        """Return a new picture (height, width, 3) of shapes (n, len(SHAPE_FIELDS)), in m and colours from 0 to 1.
 
-        Args:
-            shapes: (n, len(SHAPE_FIELDS)), m, and colours from 0 to 1.
-            pose: the camera.
-            box: the world.
+        It is the same whether or not one from there has been made before.
         """
         width, height = self.size
         eye, right, up, forward = (tuple(axis.tolist()) for axis in pose[:4])
@@ -204,37 +193,23 @@ class Canvas:
         if place != self._place:
             self._place, self._still = place, None
         elif self._still is None:  # worth it from the second picture on
-            self._still = self._blank()
-            self._cast(*self._still, False, shapes[:0], pose)
-        still, seen = self._still or self._blank()
-        image, marks = still.copy(), seen.copy()
-        self._cast(image, marks, self._still is not None, shapes, pose)
-        return image
+            self._still = self._cast(shapes[:0], pose)
+        return self._cast(shapes, pose)[0]
 
-    def _blank(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-        """Return an empty picture and what its pixels see."""
-        width, height = self.size
-        return np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64)
-
-    def _cast(
-        self, image: NDArray[np.uint8], marks: NDArray[np.int64], known: bool, shapes: NDArray[np.float64], pose: Pose
-    ) -> None:
+    def _cast(self, shapes: NDArray[np.float64], pose: Pose) -> Seen:
         """Paint a picture, over the one without shapes if that is known."""
+        width, height = self.size
+        still, seen = self._still or (np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.int64))
+        image, marks = still.copy(), seen.copy()
         ends = np.stack((shapes[:, 1:4], np.where(shapes[:, :1] == CAPSULE, shapes[:, 4:7], shapes[:, 1:4])), axis=1)
         tiles = _sort_into_tiles(outlines(pose, ends, shapes[:, 7], self.size, TILE), self.size)
-        cast(image, marks, known, self._place, prepare(shapes, pose.eye), *tiles, np.empty((_LAYERS, 2)))
+        known, found = self._still is not None, np.empty((_LAYERS, 2))
+        cast(image, marks, known, self._place, prepare(shapes, pose.eye), *tiles, found)
+        return image, marks
 
 
 def _sort_into_tiles(outlines: NDArray[np.int64], size: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return which shapes each tile of a picture has to look for.
-
-    Args:
-        outlines: (n, 4) first column and row, last column and row of the tiles each shape can reach, last excluded.
-        size: width and height of the picture, pixels.
-
-    Returns:
-        (tiles + 1,) where each tile's shapes begin in the second, and (m,) shapes, tile by tile.
-    """
+    """Return where each tile's shapes begin, (tiles + 1,), in the shapes (m,) tile by tile, from `camera.outlines`."""
     columns, rows = (-(-pixels // TILE) for pixels in size)
     wide, high = outlines[:, 2] - outlines[:, 0], outlines[:, 3] - outlines[:, 1]
     counts = wide * high

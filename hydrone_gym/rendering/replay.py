@@ -3,7 +3,7 @@
 import contextlib
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -78,64 +78,43 @@ def load_viser() -> Any:
 def write_replay(
     flight: Flown, simulation: Simulation, path: str | Path, *, title: str, trees: Sequence[Tree] = ()
 ) -> None:
-    """Write a flight as a page that plays at the speed at which it was flown.
+    """Write a flight as a page that plays as fast as it was flown; DependencyNotInstalled without the extra `replay`.
 
     Args:
         flight: from `hydrone_gym.evaluation.fly`.
         simulation: that of the environment it was flown in.
-        path: the file; its folder must exist.
+        path: the file; its folder must exist, else FileNotFoundError.
         title: of the page.
         trees: what `planners.TreeRecorder` kept, one a period; empty for a flight without trees.
-
-    Raises:
-        DependencyNotInstalled: without the extra `replay`.
-        FileNotFoundError: the folder does not exist.
     """
-    file, last = Path(path).absolute(), moment_of(flight)
+    file, last, viser = Path(path).absolute(), moment_of(flight), load_viser()
     if not file.parent.is_dir():
         raise FileNotFoundError(f"the folder of the page does not exist: {file.parent}")
     poses, trees = _camera_poses(last, simulation.world), trees if any(len(tree.edges) for tree in trees) else ()
-    with _server() as server:
+    # scenes are made with a server, although nobody connects to it; it tells where it listens
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.ExitStack() as stack:
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        stack.callback(server.stop)
         # where a browser begins that may not look at its own shape: in a frame without a file of its own
         _, server.initial_camera.position, server.initial_camera.look_at = poses[-3]
         server.initial_camera.fov = float(np.radians(FIELD_OF_VIEW))
-        recording = server.get_scene_serializer()
-        _record(recording, Stage(server.scene, last, simulation), last, simulation, trees)
+        recording, stage = server.get_scene_serializer(), Stage(server.scene, last, simulation)
+        played = moments(last, range(1, len(last.ticks) + 1), simulation.world.sensor_range)
+        for tick, moment in enumerate(played):
+            if tick % simulation.ticks == 0 and tick // simulation.ticks < len(trees):
+                stage.plan(trees[tick // simulation.ticks])
+            stage.show(moment)
+            recording.insert_sleep(HOLD if moment is last else TICK)
         page = recording.as_html()
     file.write_text(_dressed(page, title, last, simulation.world, poses, trees=bool(trees)), encoding="utf-8")
-
-
-@contextlib.contextmanager
-def _server() -> Iterator[Any]:
-    """Yield a viser server: scenes are made with one, although nobody connects to it."""
-    viser = load_viser()
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells where it listens
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        try:
-            yield server
-        finally:
-            server.stop()
-
-
-def _record(recording: Any, stage: Stage, last: Moment, simulation: Simulation, trees: Sequence[Tree]) -> None:
-    """Play the flight on the stage, tick by tick."""
-    counts = range(1, len(last.ticks) + 1)
-    for tick, moment in enumerate(moments(last, counts, simulation.world.sensor_range)):
-        if tick % simulation.ticks == 0 and tick // simulation.ticks < len(trees):
-            stage.plan(trees[tick // simulation.ticks])
-        stage.show(moment)
-        recording.insert_sleep(TICK if tick < len(last.ticks) - 1 else HOLD)
 
 
 def _camera_poses(moment: Moment, world: World) -> list[_Fitted]:
     """Return cameras beside the way from start to goal, for windows from narrow to wide."""
     middle = 0.5 * np.add(world.lower, world.upper)
-    poses = []
-    for aspect in _ASPECTS:
-        pose = beside(world, moment.ticks[0, :3], moment.goal, aspect)
-        depth = float((middle - pose.eye) @ pose.forward)
-        poses.append((aspect, pose.eye, pose.eye + depth * pose.forward))
-    return poses
+    poses = [beside(world, moment.ticks[0, :3], moment.goal, aspect) for aspect in _ASPECTS]
+    turned = [pose.eye + float((middle - pose.eye) @ pose.forward) * pose.forward for pose in poses]
+    return [(aspect, pose.eye, point) for aspect, pose, point in zip(_ASPECTS, poses, turned, strict=True)]
 
 
 def _dressed(page: str, title: str, last: Moment, world: World, poses: list[_Fitted], *, trees: bool) -> str:

@@ -10,10 +10,11 @@ above the water, is convex, so its picture is the convex hull of its projected r
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from hydrone_gym.rendering import style
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 _UNDER, _SURFACE, _ABOVE, _TOP = 1000.0, 2000.0, 3000.0, 4000.0  # paint order
 Array = NDArray[np.float64]
-_BINS = 40  # a path is painted in this many slices of depth
+_SLICE = 900.0 / 40.0  # a path is painted in 40 slices of depth
 _PIECE = 0.25  # m: longest piece of a path that lies in one slice
 # half-angles of the lit caps, all in full view of the camera
 _CAPS = np.radians([52.0, 46.0, 40.0, 34.0, 28.0, 22.0, 15.0])
@@ -36,59 +37,50 @@ _RIM = 64  # points round an outline
 
 
 class Scene:
-    """A box of the world drawn from one side, to which objects are added.
+    """A box of the world between two corners (m), seen from an azimuth (degrees), to which objects are added."""
 
-    Args:
-        lower, upper: corners of the box, m.
-        azimuth: where the camera stands, degrees.
-    """
-
-    def __init__(
-        self, lower: tuple[float, float, float], upper: tuple[float, float, float], azimuth: float = -60.0
-    ) -> None:
-        """Make the figure, its axes and the water surface."""
-        import mpl_toolkits.mplot3d  # noqa: F401  (registers the projection)
+    def __init__(self, lower: Sequence[float], upper: Sequence[float], azimuth: float = -60.0) -> None:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
 
         self.camera = axes(azimuth, ELEVATION)
-        self._lower, self._upper = np.array(lower), np.array(upper)
-        self._centre = 0.5 * (self._lower + self._upper)
-        self._reach = float(np.linalg.norm(self._upper - self._lower))
+        (x0, y0, _), (x1, y1, _) = box = np.array((lower, upper))
+        self._centre, self._reach = box.mean(axis=0), float(np.linalg.norm(box[1] - box[0]))
         with rc_context(style.FONTS):
             self.figure: Figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH)
             self.axes: Any = self.figure.add_axes((0.01, 0.09, 0.97, 0.89), projection="3d", computed_zorder=False)
-        self._frame(azimuth)
-        self._surface()
+        self._frame(box, azimuth)
+        surface = [[(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)]]
+        self._fill(surface, [(style.WATER, 0.30)], [(style.BLUE, 0.5)], 0.8, _SURFACE)
 
-    def _frame(self, azimuth: float) -> None:
+    def _frame(self, box: Array, azimuth: float) -> None:
         """Limits, equal scale on all axes, labels and a quiet background."""
         from matplotlib.ticker import MultipleLocator
 
         ax = self.axes
-        ax.set_proj_type("ortho")
         ax.view_init(elev=ELEVATION, azim=azimuth)
-        ax.set(**dict(zip(("xlim", "ylim", "zlim"), np.stack((self._lower, self._upper), axis=1), strict=True)))
-        ax.set_box_aspect(self._upper - self._lower, zoom=1.16)
-        ax.set_xlabel("x (m)", labelpad=8)
-        ax.set_ylabel("y (m)", labelpad=8)
-        ax.set_zlabel("z (m)", labelpad=2)
-        for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        ax.set(proj_type="ortho", xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
+        ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+        ax.set_box_aspect(box[1] - box[0], zoom=1.16)
+        for axis, pad in ((ax.xaxis, 8), (ax.yaxis, 8), (ax.zaxis, 2)):
+            axis.labelpad = pad
             axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
             axis._axinfo["grid"].update(color=(0.88, 0.88, 0.88, 1.0), linewidth=0.6)
             axis.set_major_locator(MultipleLocator(5.0))
 
-    def _surface(self) -> None:
-        """The translucent water surface z = 0."""
+    def _fill(self, polygons: Any, faces: Any, edges: Any, width: float, order: float) -> None:
+        """Add polygons, each (n, 3) in m, their edges so many points wide."""
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-        (x0, y0, _), (x1, y1, _) = self._lower, self._upper
-        corners = [[(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)]]
-        look = {"facecolors": [_rgba(style.WATER, 0.30)], "edgecolors": [_rgba(style.BLUE, 0.5)], "linewidths": 0.8}
-        self._add(Poly3DCollection(corners, zorder=_SURFACE, clip_on=False, **look))
+        look = {"facecolors": faces, "edgecolors": edges, "linewidths": width, "zorder": order}
+        self.axes.add_collection3d(Poly3DCollection(polygons, clip_on=False, **look), autolim=False)
 
-    def _add(self, collection: Any) -> None:
-        self.axes.add_collection3d(collection, autolim=False)
+    def _stroke(self, lines: list[Array], colour: Any, width: float, order: float) -> None:
+        """Add lines, each (n, 3) in m, so many points wide."""
+        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+        look = {"colors": [colour], "linewidths": width, "capstyle": "round", "zorder": order}
+        self.axes.add_collection3d(Line3DCollection(lines, clip_on=False, **look), autolim=False)
 
     def _order(self, points: Array, above: Any) -> Array:
         """Paint order of things at points (…, 3): nearer to the eye is later."""
@@ -97,19 +89,14 @@ class Scene:
 
     def obstacles(self, bodies: Array, shades: tuple[str, str], alpha: float = 1.0) -> None:
         """Add obstacles (M, BODY), shaded from the darkest to the lightest of two colours."""
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-        dark, light = (_rgba(shade, alpha) for shade in shades)
+        dark, light = ((*style.rgb(shade), alpha) for shade in shades)
         for body, box in zip(bodies, bounds(bodies), strict=True):
             dry = in_air(box[:, 2])
             for above in np.unique(dry):  # what rises above the water once more, over the surface
                 polygons = outlines(body, self.camera, above)
                 faces = np.linspace(dark, light, max(len(polygons), 2))[: len(polygons)]
-                edges = np.zeros_like(faces)
-                edges[:1] = _rgba("#888888", alpha)
-                order = float(self._order(box.mean(axis=0), above))
-                look = {"facecolors": faces, "edgecolors": edges, "linewidths": 0.5, "zorder": order}
-                self._add(Poly3DCollection(polygons, clip_on=False, **look))
+                edges = [("#888888", alpha), *["none"] * (len(polygons) - 1)]
+                self._fill(polygons, faces, edges, 0.5, float(self._order(box.mean(axis=0), above)))
 
     def lines(self, polylines: list[Array], colour: str, width: float, hidden: float = 0.0, lower: int = 0) -> None:
         """Add polylines, each (n, 3) in m.
@@ -117,40 +104,23 @@ class Scene:
         `hidden` is the opacity with which what obstacles hide shines through. `lower` puts a wide line beneath the thin
         ones along it, by so many slices of depth.
         """
-        from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
         parts = [part for line in polylines for part in pieces(np.asarray(line, dtype=np.float64), _PIECE)]
         if not parts:
             return
         middles = np.array([part.mean(axis=0) for part in parts])
-        slices = np.floor(self._order(middles, in_air(middles[:, 2])) / (900.0 / _BINS)).astype(int)
+        slices = np.floor(self._order(middles, in_air(middles[:, 2])) / _SLICE).astype(int)
         for number in np.unique(slices):
             chosen = [parts[i] for i in np.flatnonzero(slices == number)]
-            look = {"linewidths": width, "capstyle": "round", "zorder": (number - lower) * (900.0 / _BINS)}
-            self._add(Line3DCollection(chosen, colors=[colour], clip_on=False, **look))
+            self._stroke(chosen, colour, width, (number - lower) * _SLICE)
         if hidden > 0.0:
-            look = {"linewidths": 0.6 * width, "zorder": _TOP - 100.0}
-            self._add(Line3DCollection(polylines, colors=[_rgba(colour, hidden)], clip_on=False, **look))
+            self._stroke(polylines, (colour, hidden), 0.6 * width, _TOP - 100.0)
 
-    def mark(self, point: Array, symbol: str, colour: str, size: float, label: str) -> None:
-        """Add a mark at a point (3,) in m, never hidden; X and + are strokes, other symbols are filled discs."""
-        edge = colour if symbol in "x+" else "white"
-        look = {"markerfacecolor": colour, "markeredgecolor": edge, "markeredgewidth": 1.0}
-        self._plot(point, label, {"marker": symbol, "markersize": size, "zorder": _TOP, **look})
-
-    def ring(self, point: Array, label: str) -> None:
-        """Mark a crossing of the surface at a point (3,) in m with an open ring."""
-        look = {"markerfacecolor": "none", "markeredgecolor": style.BLUE, "markeredgewidth": 2.2}
-        self._plot(point, label, {"marker": "o", "markersize": 11, "zorder": _TOP - 1.0, **look})
-
-    def _plot(self, point: Array, label: str, look: dict[str, Any]) -> None:
-        self.axes.plot(*np.reshape(point, (3, 1)), linestyle="none", label=label, **look)
-
-
-def _rgba(colour: str, alpha: float) -> tuple[float, float, float, float]:
-    from matplotlib.colors import to_rgba
-
-    return to_rgba(colour, alpha)
+    def mark(self, point: ArrayLike, symbol: str, colour: str, size: float, label: str, hollow: bool = False) -> None:
+        """Add a mark at a point (3,) in m, never hidden; a hollow one is open and lies beneath the others."""
+        face, edge, width = ("none", colour, 2.2) if hollow else (colour, "white", 1.0)
+        look = {"markersize": size, "markerfacecolor": face, "markeredgecolor": edge, "markeredgewidth": width}
+        x, y, z = np.reshape(point, (3, 1))
+        self.axes.plot(x, y, z, symbol, label=label, zorder=_TOP - hollow, **look)
 
 
 def _rim(axis: Array, half_angle: float) -> Array:
@@ -163,12 +133,9 @@ def _rim(axis: Array, half_angle: float) -> Array:
 
 
 def outlines(body: Array, camera: Array, above: bool) -> list[Array]:
-    """Return the outline of an obstacle and of its lit caps, darkest first, as polygons in the world, each (n, 3).
+    """Return the outline of an obstacle (BODY,) and of its lit caps, darkest first, as polygons in the world, (n, 3).
 
-    Args:
-        body: (BODY,) see `hydrone_gym.world.bodies`.
-        camera: from `hydrone_gym.rendering.camera.axes`.
-        above: keep only what rises above the water; polygons that do not are left out.
+    `camera` is from `camera.axes`; if `above`, only what rises above the water is kept.
     """
     light = _LIGHT / np.linalg.norm(_LIGHT) @ camera
     line, normals = section(body, 0.0, _RIM)

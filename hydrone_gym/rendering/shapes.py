@@ -15,9 +15,8 @@ Shades = tuple[str, str]  # away from and towards the sun
 Shapes = NDArray[np.float64]  # (n, len(SHAPE_FIELDS))
 _BLACK = ("#101010", "#4a4a4a")
 _WHITE = ("#e8e8e8", "#ffffff")
-_PATH = ("#8f3d00", "#ff7a1a")
+_ORANGE = ("#8f3d00", "#ff7a1a")
 _GOAL = ("#8a3f66", "#f39ac8")
-_FRONT = ("#8f3d00", "#ff7a1a")
 _ARM = ("#10283a", "#4a6f8c")
 _REAR = ("#10283a", "#f4f7fa")
 _SHADE = ("#0a2238", "#0a2238")
@@ -29,18 +28,15 @@ def _rows(
     kind: int, a: ArrayLike, b: ArrayLike, radius: ArrayLike, shades: Shades, opacity: float = 1.0, foam: float = 0.0
 ) -> Shapes:
     """Return shapes of equal colours; `a` is (n, 3), `b` (n, 3) or (3,), `radius` (n,) or a number, in m."""
-    first = np.atleast_2d(np.asarray(a, dtype=np.float64))
-    rows = np.empty((len(first), len(SHAPE_FIELDS)))
-    rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7] = kind, first, b, radius
-    rows[:, 8:11], rows[:, 11:14] = style.rgb(shades[0]), style.rgb(shades[1])
-    rows[:, 14], rows[:, 15] = opacity, foam
+    rows = np.empty((len(np.atleast_2d(a)), len(SHAPE_FIELDS)))
+    rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7] = kind, a, b, radius
+    rows[:, 8:] = *style.rgb(shades[0]), *style.rgb(shades[1]), opacity, foam
     return rows
 
 
 def _model() -> dict[str, Shapes]:
     """The vehicle by parts, level, the arms on its axes as in the model, the front one on +x; an arm is 1 m long."""
-    ends = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], dtype=np.float64)
-    up = np.array([0.0, 0.0, 1.0])
+    up, ends = np.array([0.0, 0.0, 1.0]), np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)])
     hubs, feet = ends + 0.12 * up, ends - 0.3 * up
     frame = (
         _rows(CAPSULE, -0.18 * up, 0.12 * up, 0.26, _ARM),
@@ -48,7 +44,7 @@ def _model() -> dict[str, Shapes]:
         _rows(CAPSULE, feet, hubs, 0.066, _ARM),
         _rows(DISC, feet, up, 0.3, _ARM),
     )
-    front = _rows(CAPSULE, np.zeros(3), ends[0], 0.132, _FRONT), _rows(DISC, hubs[0], up, 0.62, _FRONT)
+    front = _rows(CAPSULE, np.zeros(3), ends[0], 0.132, _ORANGE), _rows(DISC, hubs[0], up, 0.62, _ORANGE)
     return {"frame": np.vstack(frame), "front": np.vstack(front), "rotors": _rows(DISC, hubs[1:], up, 0.62, _REAR)}
 
 
@@ -91,7 +87,7 @@ def path(points: NDArray[np.float64], radius: float) -> Shapes:
     new[-1] = True
     chosen = points[new]
     moved = (chosen[1:] != chosen[:-1]).any(axis=1)
-    tube = _rows(CAPSULE, chosen[:-1][moved], chosen[1:][moved], radius, _PATH)
+    tube = _rows(CAPSULE, chosen[:-1][moved], chosen[1:][moved], radius, _ORANGE)
     return np.vstack((_rows(SPHERE, points[0], 0.0, 2.2 * radius, _BLACK), tube))
 
 
@@ -104,12 +100,8 @@ def plumb(point: NDArray[np.float64], radius: float) -> Shapes:
 def goal(position: NDArray[np.float64], reach: float, pose: Pose, arm: float, radius: float) -> Shapes:
     """The goal: a glass ball within which it counts as reached (m), and a cross that faces the camera."""
     ends = arm * np.array([pose.right + pose.up, pose.right - pose.up]) / np.sqrt(2.0)
-    return np.vstack(
-        (
-            _rows(CAPSULE, position - ends, position + ends, radius, _GOAL),
-            _rows(SPHERE, position, 0.0, reach, (_GOAL[0], style.PURPLE), opacity=0.9),
-        )
-    )
+    ball = _rows(SPHERE, position, 0.0, reach, (_GOAL[0], style.PURPLE), opacity=0.9)
+    return np.vstack((_rows(CAPSULE, position - ends, position + ends, radius, _GOAL), ball))
 
 
 def reference(position: NDArray[np.float64], pose: Pose, size: float, radius: float) -> Shapes:
@@ -117,11 +109,10 @@ def reference(position: NDArray[np.float64], pose: Pose, size: float, radius: fl
     turns = np.linspace(0.0, 2.0 * np.pi, 17)[:, None]
     ring = position + size * (np.cos(turns) * pose.right + np.sin(turns) * pose.up)
     edge = ring + 2.0 * radius * pose.forward
-    return np.vstack(
-        (
-            _rows(CAPSULE, ring[:-1], ring[1:], radius, _BLACK),
-            _rows(CAPSULE, edge[:-1], edge[1:], 1.8 * radius, _WHITE),
-            _rows(SPHERE, position, 0.0, 1.4 * radius, _BLACK),
-            _rows(SPHERE, position + 3.0 * radius * pose.forward, 0.0, 2.4 * radius, _WHITE),
-        )
+    parts = (
+        _rows(CAPSULE, ring[:-1], ring[1:], radius, _BLACK),
+        _rows(CAPSULE, edge[:-1], edge[1:], 1.8 * radius, _WHITE),
+        _rows(SPHERE, position, 0.0, 1.4 * radius, _BLACK),
+        _rows(SPHERE, position + 3.0 * radius * pose.forward, 0.0, 2.4 * radius, _WHITE),
     )
+    return np.vstack(parts)

@@ -47,36 +47,36 @@ class Mesh(NamedTuple):
 
 
 class Stage:
-    """A mission as a viser scene.
-
-    Args:
-        scene: of a viser server, empty.
-        moment: the mission; only what never changes about it is used.
-        simulation: that of the flight, for its world, vehicle and period.
-    """
+    """A mission as a viser scene: it begins with all that stands still, and with what moves where it begins."""
 
     def __init__(self, scene: Any, moment: Moment, simulation: Simulation) -> None:
-        """Add everything that stands still, and what moves where it begins."""
         self._scene, self._world = scene, simulation.world
         self._middles, self._sizes = placed(moment.obstacles)
         self._vehicle = scene.add_frame("/vehicle", show_axes=False)
         for name, colour in (("frame", _ARM), ("front", style.RED), ("rotors", _ROTOR)):
             self._mesh(f"/vehicle/{name}", model(shapes.MODEL[name], simulation.vehicle.arm * VEHICLE_SCALE), colour)
         self._reference = self._mesh("/reference", ball(0.14, rings=8), style.BLACK)
-        (x0, y0, bottom), (x1, y1, top) = simulation.world.lower, simulation.world.upper
-        x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        (_, _, bottom), (_, _, top) = self._world.lower, self._world.upper
+        x, y, _ = 0.5 * np.add(self._world.lower, self._world.upper)
         # on top of the box it is in view and in nobody's way
         self._label = scene.add_label("/label", "", position=(x, y, top), anchor="center-center", font_screen_scale=1.2)
         self._plumb = self._lines("/plumb", np.zeros((1, 2, 3)), "#5d6f7d", 1.0)
         self._trees: dict[str, Any] = {}
         self._path: Any = None
-        self._add_marks(moment, simulation.world)
-        self._add_box(simulation.world)
-        self._add_water(simulation.world)
+        self._add_marks(moment, self._world)
+        self._add_box(self._world)
+        self._add_water(self._world)
         dry = in_air(self._middles[:, 2])
-        self._known = self._bodies("/obstacles/detected", dry | True, DETECTED)
-        self._unknown = self._bodies("/obstacles/unknown, under water", ~dry, UNKNOWN, (x, y, 0.5 * bottom))
-        self._unknown += self._bodies("/obstacles/unknown, in the air", dry, UNKNOWN, (x, y, 0.5 * top))
+        groups = (
+            ("detected", dry | True, True, None),
+            ("unknown, under water", ~dry, False, (x, y, 0.5 * bottom)),
+            ("unknown, in the air", dry, False, (x, y, 0.5 * top)),
+        )
+        self._obstacles = [
+            (self._bodies(f"/obstacles/{name}", chosen, origin), chosen, known)
+            for name, chosen, known, origin in groups
+            if chosen.any()
+        ]
 
     def show(self, moment: Moment) -> None:
         """Move to a moment; to be called for every tick in order."""
@@ -87,21 +87,19 @@ class Stage:
         self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
         self._label.text = ", ".join(moment.words(self._world.zone))
         self._grow(moment.ticks[:, :3])
-        for group, there in ((self._known, moment.detected), (self._unknown, ~moment.detected)):
-            scales = np.where(there, self._sizes, _GONE).astype(np.float32)
-            for bodies, chosen in group:
-                bodies.batched_scales = scales[chosen]
+        for bodies, chosen, known in self._obstacles:
+            scales = np.where(moment.detected == known, self._sizes, _GONE)
+            bodies.batched_scales = scales[chosen].astype(np.float32)
 
     def plan(self, tree: Tree) -> None:
         """Show the tree of a period, and the path in it."""
         edges, followed = np.round(_FINE * tree.edges) / _FINE, np.zeros(len(tree.edges), bool)
         followed[tree.path] = True
-        parts = {
-            "/tree/air": (tree.air & ~followed, style.RED, 1.0),
-            "/tree/water": (~tree.air & ~followed, style.PURPLE, 1.0),
-            "/tree/plan": (followed, style.BLACK, 2.0),
-        }
-        for name, (chosen, colour, width) in parts.items():
+        for name, chosen, colour, width in (
+            ("/tree/air", tree.air & ~followed, style.RED, 1.0),
+            ("/tree/water", ~tree.air & ~followed, style.PURPLE, 1.0),
+            ("/tree/plan", followed, style.BLACK, 2.0),
+        ):
             # three.js cannot draw no edges: without one, what is there is not seen
             points = edges[chosen] if chosen.any() else np.zeros((1, 2, 3))
             if name in self._trees:
@@ -112,14 +110,11 @@ class Stage:
 
     def _grow(self, path: NDArray[np.float64]) -> None:
         """Add the last tick to the path."""
-        ticks = len(path) - 1
-        if ticks == 0:
-            return
-        first = (ticks - 1) // _CHUNK * _CHUNK
+        first = max(len(path) - 2, 0) // _CHUNK * _CHUNK
         edges = np.stack((path[first:-1], path[first + 1 :]), axis=1)
-        if ticks - first == 1:
+        if len(edges) == 1:
             self._path = self._lines(f"/path/{first}", edges, style.RED, 4.0)
-        else:
+        elif len(edges):
             self._path.points = edges.astype(np.float32)
 
     def _add_marks(self, moment: Moment, world: World) -> None:
@@ -155,18 +150,13 @@ class Stage:
             for k, wall in enumerate(walls(lower, upper, low, high)):
                 self._mesh(f"/{name} {k}", wall, colour, opacity=opacity, side="double")
 
-    def _bodies(
-        self, name: str, chosen: NDArray[np.bool_], colour: str, origin: tuple[float, float, float] | None = None
-    ) -> list[tuple[Any, NDArray[np.bool_]]]:
-        """Add some of the obstacles in one look, if any, none of them there yet; with an origin (m) they are glass."""
-        if not chosen.any():
-            return []
+    def _bodies(self, name: str, chosen: NDArray[np.bool_], origin: tuple[float, float, float] | None) -> Any:
+        """Add some of the obstacles, none of them there yet; with an origin (m) they are glass."""
         count, middle = int(chosen.sum()), np.array(origin or (0.0, 0.0, 0.0))
         place = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), self._middles[chosen] - middle
-        look: dict[str, Any] = {"batched_colors": style.rgb(colour), "opacity": origin and _GLASS, "lod": "off"}
-        look |= {"batched_scales": np.full(count, _GONE), "position": middle, **_SHADELESS}
-        bodies = self._scene.add_batched_meshes_simple(name, *mesh(UNIT), *place, **look)
-        return [(bodies, chosen)]
+        look: dict[str, Any] = {"batched_colors": style.rgb(UNKNOWN if origin else DETECTED), "lod": "off"}
+        look |= {"batched_scales": np.full(count, _GONE), "position": middle, "opacity": origin and _GLASS}
+        return self._scene.add_batched_meshes_simple(name, *mesh(UNIT), *place, **look, **_SHADELESS)
 
     def _mesh(self, name: str, part: Mesh, colour: str, *, opacity: float | None = None, side: str = "front") -> Any:
         """Add a mesh; one that is translucent has its origin in its middle."""
@@ -210,9 +200,6 @@ def walls(lower: ArrayLike, upper: ArrayLike, low: float, high: float) -> list[M
 
 def model(rows: NDArray[np.float64], size: float) -> Mesh:
     """Return capsules and discs of the ray caster as rods, so many times as large."""
-    rods = []
-    for row in rows:
-        a, b = row[1:4], row[4:7]
-        ends = (a, b) if row[0] == CAPSULE else (a - _THICK * b, a + _THICK * b)
-        rods.append(rod(size * ends[0], size * ends[1], size * row[7], 20))
-    return Mesh.joined(*rods)
+    a, b, discs = size * rows[:, 1:4], size * rows[:, 4:7], rows[:, :1] != CAPSULE
+    starts, ends = np.where(discs, a - _THICK * b, a), np.where(discs, a + _THICK * b, b)
+    return Mesh.joined(*(rod(*each, 20) for each in zip(starts, ends, size * rows[:, 7])))

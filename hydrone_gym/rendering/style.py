@@ -22,7 +22,6 @@ FONTS: dict[str, object] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "pdf.fonttype": 42,  # text stays text
-    "path.simplify": True,
 }
 
 

@@ -29,15 +29,9 @@ _SLACK = 1e-3  # m: ticks are samples, sensing is continuous
 
 
 class Track:
-    """The flight of one vehicle from where it was first seen.
-
-    Args:
-        row: (1,) dtype `ROW`: where it begins; copied.
-        obstacles: (M, BODY) see `hydrone_gym.world.bodies`.
-    """
+    """The flight of one vehicle from where it was first seen: a row (1,) of dtype `ROW`, and obstacles (M, BODY)."""
 
     def __init__(self, row: np.ndarray, obstacles: NDArray[np.float64]) -> None:
-        """Begin."""
         self.goal: NDArray[np.float64] = row["goal"][0].copy()
         self.obstacles = np.array(obstacles, dtype=np.float64)
         self._parts: list[Ticks] = [np.concatenate((row["state"][0], row["reference"][0]))[None]]
@@ -50,8 +44,7 @@ class Track:
     def ticks(self, simulation: Simulation) -> Ticks:
         """Return every tick so far, the start included; the same kernel gives the same numbers as the flight itself.
 
-        Args:
-            simulation: of the flight's vehicle, world and period, with one lane.
+        `simulation` is of the flight's vehicle, world and period, with one lane.
         """
         for row, reference in self._waiting:
             _, states, references, _ = trajectory(simulation, row, reference[None], self.obstacles)
@@ -85,27 +78,16 @@ class Moment(NamedTuple):
 
 
 def moments(last: Moment, counts: Iterable[int], sensor_range: float) -> Iterator[Moment]:
-    """Yield a mission at earlier moments, those at which so many of its ticks had been flown.
+    """Yield a mission, given as it is now, when so many of its ticks, the start included, had been flown.
 
-    Args:
-        last: the mission now.
-        counts: numbers of ticks, the start included, from 1 to all.
-        sensor_range: distance (m) at which a surface is detected. What has been detected without having come so near
-            was known from the start.
+    What has been detected without having come nearer than the sensor range (m) was known from the start.
     """
-    near = distances(last.ticks[:, :3], last.obstacles) <= sensor_range + _SLACK
-    since = np.argmax(near, axis=0)
+    since = np.argmax(distances(last.ticks[:, :3], last.obstacles) <= sensor_range + _SLACK, axis=0)
     total = len(last.ticks)
     for count in counts:
-        if count == total:
-            yield last
-            continue
-        yield last._replace(
-            ticks=last.ticks[:count],
-            detected=last.detected & (since < count),
-            time=last.time - (total - count) * TICK,
-            outcome=Outcome.RUNNING,
-        )
+        time, detected = last.time - (total - count) * TICK, last.detected & (since < count)
+        earlier = Moment(last.ticks[:count], last.goal, last.obstacles, detected, time, Outcome.RUNNING)
+        yield last if count == total else earlier
 
 
 class Flown(Protocol):
@@ -134,16 +116,9 @@ class Flown(Protocol):
 
 def moment_of(flight: Flown) -> Moment:
     """Return the end of a flight as a moment to be drawn."""
-    known = {tuple(body) for body in flight.detected.tolist()}
-    obstacles = flight.scenario.obstacles
-    return Moment(
-        ticks=np.hstack((flight.trace.states, flight.trace.references)),
-        goal=np.array(flight.scenario.goal),
-        obstacles=obstacles,
-        detected=np.array([tuple(body) in known for body in obstacles.tolist()], dtype=bool),
-        time=flight.time,
-        outcome=flight.outcome,
-    )
+    ticks, obstacles = np.hstack((flight.trace.states, flight.trace.references)), flight.scenario.obstacles
+    detected = (obstacles[:, None] == flight.detected).all(axis=2).any(axis=1)
+    return Moment(ticks, np.array(flight.scenario.goal), obstacles, detected, flight.time, flight.outcome)
 
 
 class Tree(Protocol):

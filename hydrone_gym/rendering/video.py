@@ -1,6 +1,5 @@
 """A flight as a film: smooth, as flights are known at every tick, and at the speed at which it was flown."""
 
-import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -25,7 +24,7 @@ def frames(
     world: World | None = None,
     vehicle: Vehicle = HYDRONE,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield pictures (height, width, 3) of a flight, the last of its end.
+    """Yield pictures (height, width, 3) of a flight, the last of its end; ValueError for an option out of range.
 
     Args:
         flight: from `hydrone_gym.evaluation.fly`.
@@ -33,9 +32,6 @@ def frames(
         every: ticks of 0.05 s from picture to picture.
         world: the world it was flown in, the default one if None; its sensor range tells when obstacles were detected.
         vehicle: the vehicle.
-
-    Raises:
-        ValueError: an option out of range.
     """
     if isinstance(every, bool) or not isinstance(every, int) or every < 1:
         raise ValueError(f"every must be a whole number of ticks of at least 1, got {every!r}")
@@ -47,12 +43,9 @@ def frames(
 
 
 def save_film(pictures: Iterable[NDArray[np.uint8]], path: str | Path, *, fps: float = 1.0 / TICK) -> None:
-    """Write pictures as an MP4 film.
+    """Write pictures (height, width, 3), all of one even size, such as `frames` yields, as an MP4 film.
 
-    Args:
-        pictures: (height, width, 3) each, all of one even size, such as `frames` yields.
-        path: the file; its folder must exist.
-        fps: pictures a second; the default plays those of every tick at the speed of the flight.
+    `fps` is pictures a second; the default plays those of every tick at the speed of the flight.
 
     Raises:
         DependencyNotInstalled: without the extra `render`.
@@ -68,13 +61,13 @@ def save_film(pictures: Iterable[NDArray[np.uint8]], path: str | Path, *, fps: f
     file = Path(path).absolute()
     if not file.parent.is_dir():
         raise FileNotFoundError(f"the folder of the film does not exist: {file.parent}")
-    waiting = iter(pictures)
-    first = next(waiting, None)
-    if first is None:
-        raise ValueError("a film must have at least one picture, got none")
-    height, width, _ = first.shape
-    film = imageio_ffmpeg.write_frames(str(file), (width, height), fps=fps, macro_block_size=2, quality=8)
-    film.send(None)
-    for picture in itertools.chain((first,), waiting):
+    film = None
+    for picture in pictures:
+        if film is None:
+            size = picture.shape[1::-1]
+            film = imageio_ffmpeg.write_frames(str(file), size, fps=fps, macro_block_size=2, quality=8)
+            film.send(None)
         film.send(np.ascontiguousarray(picture))
+    if film is None:
+        raise ValueError("a film must have at least one picture, got none")
     film.close()

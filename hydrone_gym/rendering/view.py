@@ -1,10 +1,13 @@
 """What an environment holds to be drawn: the tracks of its rows, and pictures or a window made of them."""
 
+import os
 import time
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import logger
-from gymnasium.error import ResetNeeded
+from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
 from hydrone_gym.rendering.camera import View
@@ -22,22 +25,12 @@ class Screen:
         mode: of `modes`; "human" shows row 0 in a window, tick by tick and in real time, instead of returning pictures.
         size, camera: see `View`.
         simulation: the environment's; a twin is made, as its working storage is in use.
-        modes: those that the environment knows.
-
-    Raises:
-        ValueError: an option out of range.
-        DependencyNotInstalled: mode "human" without pygame.
+        modes: those that the environment knows; ValueError for another.
     """
 
     def __init__(
-        self,
-        mode: str | None,
-        size: tuple[int, int],
-        camera: str,
-        simulation: Simulation,
-        modes: tuple[str, ...] = MODES,
+        self, mode: str | None, size: tuple[int, int], camera: str, simulation: Simulation, modes: Sequence[str] = MODES
     ) -> None:
-        """Check the options and make all but the tracks."""
         view = View(size=size, camera=camera)
         if mode is not None and mode not in modes:
             raise ValueError(f"render_mode must be one of None, {', '.join(map(repr, modes))}, got {mode!r}")
@@ -46,20 +39,15 @@ class Screen:
         self._painter, self._window = None, None
         if mode is not None:  # what is heavy is imported by environments that are drawn
             from hydrone_gym.rendering.frame import Painter
-            from hydrone_gym.rendering.window import Window
 
             self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
             self._painter = Painter(view, simulation.world, simulation.vehicle)
             self._window = Window(view.size) if mode == "human" else None
 
     def begin(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8], obstacles: NDArray[np.float64]) -> None:
-        """Row n begins a flight where it is now.
+        """Row n of rows (N,) of dtype `ROW` begins a flight where it is, among obstacles (k, BODY).
 
-        Args:
-            n: which row.
-            rows: (rows,) dtype `ROW`.
-            seen: (rows, M) 1 for a detected obstacle.
-            obstacles: (k, BODY), k at most M.
+        Of `seen` (N, M), M at least k, a detected obstacle has 1.
         """
         self.restore(n, rows, obstacles, None)
         self._shown = 0
@@ -71,10 +59,7 @@ class Screen:
             self._tracks[n].add(rows[n : n + 1], references[n])
 
     def update(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
-        """Show what has not been shown, if there is a window, in real time.
-
-        A machine too slow for that skips pictures, never the last.
-        """
+        """Show the rest in the window, if any, in real time; a machine too slow skips pictures, never the last."""
         window = self._window
         if self._painter is None or window is None or window.closed:
             return
@@ -92,14 +77,9 @@ class Screen:
             time.sleep(max(0.0, due - time.monotonic()))
 
     def render(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
-        """Return a new picture of row n (height, width, 3), or show it and return None.
-
-        Raises ResetNeeded when row n has not begun an episode.
-        """
+        """Return a new picture of row n (height, width, 3), or show it; ResetNeeded before its first episode."""
         if self._painter is None:
-            logger.warn(
-                'render() draws nothing without a render_mode; give one when making it: render_mode="rgb_array"'
-            )
+            logger.warn('render() draws nothing without a render_mode, such as render_mode="rgb_array"')
             return None
         if n not in self._tracks:
             raise ResetNeeded("there is nothing to draw before the first reset: call reset()")
@@ -129,6 +109,64 @@ class Screen:
         detected = seen[n, : len(track.obstacles)] != 0
         clock, outcome = float(rows["ticks"][n]) * TICK, Outcome(int(rows["outcome"][n]))
         return Moment(track.ticks(self._simulation), track.goal, track.obstacles, detected, clock, outcome)
+
+
+class Window:
+    """Shows pictures of a size through pygame, from the first on, until its user or the program closes it.
+
+    A process has one window; environments that are shown at the same time share it. A copy of a window stays closed.
+    Without a display it warns once and shows nothing; without pygame it raises DependencyNotInstalled.
+    """
+
+    _shown: ClassVar[int] = 0  # windows of this process that are open
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # it would stand in the output of programs
+        try:
+            import pygame
+        except ImportError as error:
+            raise DependencyNotInstalled(
+                'render_mode="human" needs pygame, part of the extra "render": pip install "hydrone-gym[render]"'
+            ) from error
+        self.size, self._pygame = size, pygame
+        self.closed = False
+        self._surface: Any = None
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show a picture (height, width, 3); a window that its user has closed stays closed."""
+        if self.closed or (self._surface is None and not self._open()):
+            return
+        if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
+            self.close()
+            return
+        self._pygame.surfarray.blit_array(self._surface, image.swapaxes(0, 1))
+        self._pygame.display.flip()
+
+    def _open(self) -> bool:
+        """Open the window; return whether there is one now."""
+        try:
+            self._pygame.display.init()
+            self._surface = self._pygame.display.set_mode(self.size)
+        except self._pygame.error as error:
+            logger.warn(f'render_mode="human" shows nothing: {error}')
+            self.closed = True
+            return False
+        self._pygame.display.set_caption("hydrone_gym")
+        Window._shown += 1
+        return True
+
+    def close(self) -> None:
+        """Close the window for good; a second call does nothing."""
+        self.closed = True
+        if self._surface is None:
+            return
+        self._surface = None
+        Window._shown -= 1
+        if Window._shown == 0:
+            self._pygame.display.quit()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"size": self.size, "closed": True, "_surface": None}
 
 
 new_screen = Screen  # what environments call

@@ -11,8 +11,7 @@ from matplotlib.colors import to_rgb
 
 from hydrone_gym import Scenario, World
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.figures import plot_path, plot_tree, save_figure
-from hydrone_gym.rendering.histories import plot_attitude, plot_position
+from hydrone_gym.rendering.figures import plot_attitude, plot_path, plot_position, plot_tree, save_figure
 from hydrone_gym.rendering.paths import crossing_points, dash, split_media
 from hydrone_gym.rendering.scene3d import Scene
 from planners import TreeView
@@ -168,8 +167,5 @@ def test_equal_flights_give_equal_files(dive, tmp_path):
 
 
 def test_matplotlib_is_loaded_only_to_draw():
-    program = (
-        "import sys, hydrone_gym.rendering.figures, hydrone_gym.rendering.histories;"
-        "sys.exit('matplotlib' in sys.modules)"
-    )
+    program = "import sys, hydrone_gym.rendering.figures; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False, timeout=120).returncode == 0

@@ -11,7 +11,7 @@ import pygame
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from hydrone_gym.rendering.window import Window
+from hydrone_gym.rendering.view import Window
 from tests.envs.missions import DIVE, IDS, begin, make, same
 
 HOVER = np.array([*DIVE.start[:3], 0.0])
