@@ -1,0 +1,93 @@
+"""The one stop check: its constants have their reasons, and CL-RRT and the shield ask the same one."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import hydrone_gym  # noqa: F401
+from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, Scenario
+from hydrone_gym.simulation.rollout import Rollout
+from hydrone_gym.simulation.simulation import Simulation, row_at
+from hydrone_gym.world.world import World
+from planners import CLRRT, CLRRTSettings
+from planners.cl_rrt.execute import Query, cycle
+from planners.cl_rrt.tree import BACKUP, Workspace, new_nodes
+from planners.policy import known
+from planners.shield import RETREAT, Shield
+from planners.stop_check import AIR_GATE, LOOK_AHEAD, MARGIN
+
+VEHICLES = pytest.mark.parametrize("vehicle", [HYDRONE, HYDRONE_PHYSICAL], ids=lambda vehicle: vehicle.name)
+
+
+def seconds_to_rest(vehicle, state, reference):
+    """How long a vehicle takes to be slow, level and outside the zone at a reference, in whole periods."""
+    rollout, row = Rollout(Simulation(vehicle, World()), np.zeros((0, 4))), row_at(np.array(state))
+    for period in range(1, 40):
+        assert rollout.fly(row, np.array(reference)).outcome == Outcome.RUNNING
+        s = row["state"][0]
+        level = np.linalg.norm(s[[3, 4, 9, 10]]) < 0.02
+        if np.linalg.norm(s[6:9]) < 0.03 and level and abs(s[2]) > 0.8:
+            return 0.5 * period
+    return np.inf
+
+
+@VEHICLES
+def test_stops_fit_into_the_look_ahead(vehicle):
+    fast = seconds_to_rest(vehicle, [0, 0, 5.0, 0, 0, 0, 2.0, 0, 0, 0, 0, 0], [0.4, 0, 5.0, 0])
+    out_of_water = seconds_to_rest(vehicle, [0, 0, -1.0, *np.zeros(9)], [0, 0, AIR_GATE, 0])
+    assert (fast, out_of_water) == (4.5, 5.5)
+    assert max(fast, out_of_water) <= LOOK_AHEAD < max(fast, out_of_water) + 1.0
+
+
+def test_both_keep_the_same_margin():
+    """What the shield lets pass beside a sphere keeps the margin until the vehicle rests, and some comes that near."""
+    assert CLRRTSettings().rest_margin == MARGIN
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=1)
+    sphere, shield = np.array([[0.0, 0.0, 5.0, 1.0]]), Shield.for_env(None, env)
+    observation, _ = env.reset(seed=0)
+    observation["state"][:6], observation["obstacles"][0] = (-1.8, 0, 5, 0, 0, 0), sphere[0]
+    observation["reference"][:] = observation["state"][[0, 1, 2, 5]]
+    least = []
+    for x in np.linspace(-1.9, -1.0, 91):
+        sent, held, choice = shield.check(observation, np.array([[x, 0, 5, 0]]), observation["reference"][None])
+        row, rollout = row_at(observation["state"], observation["goal"]), Rollout(shield.simulation, sphere)
+        if choice[0] == 0:
+            least.append(min(rollout.fly(row, reference).clearance for reference in [sent[0], *[held[0]] * 12]))
+    assert MARGIN <= min(least) < MARGIN + 0.02
+    assert len(least) < 91
+
+
+def drifting(env, vy):
+    """A vehicle under water that is carried slowly through the wall, holding a hover."""
+    observation, _ = env.reset(options={"scenario": Scenario(start=(0, -9.5, -3, 0), goal=(0, 9, -3), obstacles=())})
+    observation["state"][:3], observation["state"][7] = (0.0, -9.96, -3.0), vy
+    observation["reference"][:] = (0.0, -9.9, -3.0, 0.0)
+    return observation
+
+
+def test_what_cl_rrt_holds_under_water_is_verified_again():
+    """Walled in, it has nothing to send; what it holds would let it drift out of the box, so it swims against that."""
+    env = gym.make("HydroneGym/Mission-v0")
+    observation = drifting(env, -0.004)
+    held = observation["reference"][None]
+    retreat, _, choice = Shield.for_env(None, env).check(observation, held, held)
+    assert choice.tolist() == [RETREAT]
+    planner, now = CLRRT.for_env(env), known(observation)
+    work = Workspace.around(new_nodes(100), np.zeros((BACKUP, 4)), planner.simulation, now.obstacles)
+    query = Query(
+        start=now.vessel,
+        goal=now.goal,
+        eye=now.state[:3],
+        draws=np.zeros(0),
+        size=0,
+        root=-1,
+        known_before=0,
+        held=held[0],
+        holds=True,
+        roam=0,
+        iterations=0,  # no tree, so no path
+        begin=True,
+        finish=True,
+    )
+    assert cycle(work, query, planner._constants)[1] == -1
+    np.testing.assert_array_equal(work.backup[0], retreat[0])
