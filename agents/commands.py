@@ -131,44 +131,6 @@ class Demonstrate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clone:
-    """Learn a policy from demonstrations by imitation, evaluate it on held-out worlds and write an agent's folder."""
-
-    EXTRA: ClassVar = "agents,demonstrations"
-
-    data: Annotated[Path, tyro.conf.Positional] = Path("demonstrations")
-    """Folder of one dataset or of several."""
-    out: Path = Path("runs/clone")
-    """Folder of the agent; must not hold one already."""
-    seed: int = 0
-    """Of weights and of the order of the data."""
-    epochs: int = 400
-    """Times that every pair is learnt from."""
-    batch: int = 512
-    """Pairs a step of Adam."""
-    learning_rate: float = 1e-3
-    """At the beginning; it falls linearly to zero."""
-    evaluation_episodes: int = 1000
-    """Held-out worlds a mission to evaluate on, 0 for none."""
-    json: bool = False
-    """Print one JSON document instead of the tables, and show no progress bar."""
-
-    def run(self) -> int:
-        """Learn, report and return the exit code."""
-        from agents.cloning import Cloning, clone
-        from hydrone_gym.evaluation.run import evaluate_held_out
-
-        names = ("data", "out", "seed", "epochs", "batch", "learning_rate")
-        cloned = clone(Cloning(**{name: getattr(self, name) for name in names}, progress=not self.json))
-        flown: tuple[list[Record], list[dict[str, Any]]] = ([], [])
-        if self.evaluation_episodes > 0:
-            flown = evaluate_held_out(str(self.out), worlds=self.evaluation_episodes, options=cloned.options)
-        if not self.json:
-            print(cloned.summary())
-        return _report(self.json, self.out, *flown, cloning=cloned.notes())
-
-
-@dataclass(frozen=True, kw_only=True)
 class Failures:
     """Fly an agent in many held-out worlds, and say where and why it fails: tables, failures.csv and figures."""
 
@@ -207,13 +169,13 @@ class Failures:
         return 0
 
 
-def _report(as_json: bool, folder: Path, records: list[Record], scores: list[dict[str, Any]], **more: Any) -> int:
+def _report(as_json: bool, folder: Path, records: list[Record], scores: list[dict[str, Any]]) -> int:
     """Print what came of an agent: tables and its folder, or one JSON document."""
     from hydrone_gym.evaluation.summary import summarise
     from hydrone_gym.evaluation.tables import print_tables, tables_of
 
     if as_json:
-        print(json.dumps({"folder": str(folder), **more, "scores": scores}))
+        print(json.dumps({"folder": str(folder), "scores": scores}))
         return 0
     if records:
         print_tables(tables_of(summarise(records)))
