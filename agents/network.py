@@ -1,5 +1,6 @@
 """A multilayer perceptron in float32, as a kernel: a row's output does not depend on the rows beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,11 @@ from numpy.typing import NDArray
 
 from hydrone_gym._jit import kernel
 
-_ACTIVATIONS = {"linear": lambda x: x, "relu": lambda x: np.maximum(x, np.float32(0.0)), "tanh": np.tanh}
+_ACTIVATIONS: dict[str, Callable[[NDArray], NDArray]] = {
+    "linear": lambda x: x,
+    "relu": lambda x: np.maximum(x, np.float32(0.0)),
+    "tanh": np.tanh,
+}
 
 
 @kernel
