@@ -22,13 +22,9 @@ class Agent:
 
     The egocentric observation and the relative action are made inside; what that needs from one period to the next
     travels in the state. Actions are those of the trained model's mean, and do not depend on the size of the batch.
+    `file` has the network, `model` the vehicle and the world it believes in, the default ones unless given.
 
-    Args:
-        file: the network and what is known about it.
-        model: what it believes, for its vehicle and world; the default ones unless given.
-
-    Raises:
-        ValueError: a network with other inputs or outputs than the egocentric interface has.
+    Raises ValueError for a network with other inputs or outputs than the egocentric interface has.
     """
 
     def __init__(self, file: AgentFile, model: Modelled | None = None) -> None:
@@ -63,10 +59,9 @@ class Agent:
         Raises:
             ValueError: an observation of another interface, or arrays of the wrong shape.
         """
-        starting = episode_start
-        if starting is not None and "state" in observation and np.ndim(observation["state"]) == 1:
-            starting = np.reshape(starting, ())
-        seen, memory = self._egocentric.observe(observation, state, starting)
+        if episode_start is not None and "state" in observation and np.ndim(observation["state"]) == 1:
+            episode_start = np.reshape(episode_start, ())
+        seen, memory = self._egocentric.observe(observation, state, episode_start)
         action = self.relative_action(np.atleast_2d(seen)).reshape((*seen.shape[:-1], ACTIONS))
         return self._egocentric.reference(action, observation, memory), memory
 
@@ -90,8 +85,7 @@ def load_agent(name_or_path: str | os.PathLike[str], env: Any = None) -> Agent:
         TypeError: an environment of another kind.
     """
     path = Path(name_or_path)
-    shipped = PRETRAINED / path
-    folder = shipped if len(path.parts) == 1 and (shipped / TEXT).is_file() else path
+    folder = PRETRAINED / path if str(path) in shipped_agents() else path
     if not folder.exists():
         names = ", ".join(shipped_agents()) or "none"
         raise FileNotFoundError(f"no agent {os.fspath(name_or_path)!r}: shipped are {names}; or give a folder")

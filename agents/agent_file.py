@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from gymnasium.envs.registration import registry
 
 from agents.network import Network
@@ -43,8 +44,6 @@ def observation_fingerprint() -> str:
 
 def save_agent(agent: AgentFile, folder: Path) -> None:
     """Write an agent to a folder, made if missing; raises OSError when that fails."""
-    import yaml
-
     folder.mkdir(parents=True, exist_ok=True)
     network = agent.network
     arrays = {f"weight_{k}": weight for k, weight in enumerate(network.weights)}
@@ -80,19 +79,12 @@ def read_agent(folder: Path) -> AgentFile:
         network = _network(_checked(content), text.parent)
     except ValueError as error:
         raise ValueError(f"{text}: {error}") from None
-    return AgentFile(
-        name=str(content["name"]),
-        algorithm=str(content["algorithm"]),
-        environment=content["environment"],
-        network=network,
-        notes=content.get("notes") or {},
-    )
+    name, algorithm, notes = str(content["name"]), str(content["algorithm"]), content.get("notes") or {}
+    return AgentFile(name=name, algorithm=algorithm, environment=content["environment"], network=network, notes=notes)
 
 
 def read_yaml(file: Path) -> Any:
     """Return plain data from a YAML file, nothing else; ValueError in one line, naming the file."""
-    import yaml
-
     try:
         return yaml.safe_load(file.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -135,12 +127,8 @@ def _network(content: dict[str, Any], folder: Path) -> Network:
             biases = tuple(np.ascontiguousarray(arrays[f"bias_{k}"]) for k in layers)
     except (AttributeError, KeyError, OSError, TypeError, zipfile.BadZipFile) as error:
         raise ValueError(f"{file.name} does not hold the layers of a network: {error}") from None
-    network = Network(
-        weights=weights,
-        biases=biases,
-        activation=str(described.get("activation")),
-        output=str(described.get("output")),
-    )
+    activation, output = str(described.get("activation")), str(described.get("output"))
+    network = Network(weights=weights, biases=biases, activation=activation, output=output)
     if network.sizes != described.get("sizes"):
         raise ValueError(f"layers of sizes {network.sizes} were found, {described.get('sizes')} were noted")
     return network

@@ -1,8 +1,7 @@
 """The algorithms that can be trained, and how an agent is taken out of a model of theirs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -14,39 +13,25 @@ from agents.agent_file import AgentFile
 from agents.network import Network
 
 
-@dataclass(frozen=True, kw_only=True)
-class Algorithm:
+class Algorithm(NamedTuple):
     """One class of Stable-Baselines3 and how its models are built and taken apart."""
 
     model: type[BaseAlgorithm]  # the class
-    # from its policy to the modules, in order, whose output is the mean action before squashing
-    mean: Callable[[Any], Sequence[torch.nn.Module]]
+    mean: Callable[
+        [Any], Sequence[torch.nn.Module]
+    ]  # modules of its policy, in order, up to the unsquashed mean action
     output: str  # what squashes it: "tanh", or "linear" for nothing
     log_interval: int  # updates, or for off-policy algorithms episodes, between two points in TensorBoard
 
 
-def _ppo_mean(policy: Any) -> Sequence[torch.nn.Module]:
-    return [*policy.mlp_extractor.policy_net, policy.action_net]
-
-
-_PPO = Algorithm(model=PPO, mean=_ppo_mean, output="linear", log_interval=1)
-_SAC = Algorithm(model=SAC, mean=lambda p: [*p.actor.latent_pi, p.actor.mu], output="tanh", log_interval=1000)
-_TQC = replace(_SAC, model=TQC)
-_TD3 = replace(_SAC, model=TD3, mean=lambda policy: [*policy.actor.mu][:-1])  # the last module is its tanh
+_PPO = Algorithm(PPO, lambda policy: [*policy.mlp_extractor.policy_net, policy.action_net], "linear", 1)
+_SAC = Algorithm(SAC, lambda policy: [*policy.actor.latent_pi, policy.actor.mu], "tanh", 1000)
+_TD3 = _SAC._replace(model=TD3, mean=lambda policy: [*policy.actor.mu][:-1])  # the last module is its tanh
 
 # by the name of the recipe, agents/hyperparameters/<name>.yml
-ALGORITHMS = {"ppo": _PPO, "ppo_shielded": _PPO, "sac": _SAC, "td3": _TD3, "tqc": _TQC}
+ALGORITHMS = {"ppo": _PPO, "ppo_shielded": _PPO, "sac": _SAC, "td3": _TD3, "tqc": _SAC._replace(model=TQC)}
 
 _ACTIVATIONS: dict[type, str] = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
-
-
-def algorithm_of(model: BaseAlgorithm) -> Algorithm:
-    """Return the entry of a model's class; raises ValueError for a class that has none."""
-    found = [algorithm for algorithm in ALGORITHMS.values() if type(model) is algorithm.model]
-    if found:
-        return found[0]
-    known = sorted({algorithm.model.__name__ for algorithm in ALGORITHMS.values()})
-    raise ValueError(f"model must be one of {', '.join(known)}, got {type(model).__name__}")
 
 
 def export_agent(model: BaseAlgorithm, name: str, environment: str, notes: dict[str, Any] | None = None) -> AgentFile:
@@ -61,21 +46,19 @@ def export_agent(model: BaseAlgorithm, name: str, environment: str, notes: dict[
     Raises:
         ValueError: another algorithm, or a policy that is no plain multilayer perceptron.
     """
-    algorithm = algorithm_of(model)
-    network = network_of(algorithm.mean(model.policy), algorithm.output)
-    kind = type(model).__name__
-    return AgentFile(name=name, algorithm=kind, environment=environment, network=network, notes=notes or {})
-
-
-def network_of(layers: Sequence[torch.nn.Module], output: str = "linear") -> Network:
-    """Return the network that some modules in a row are; raises ValueError for what is no multilayer perceptron."""
+    kind, known = type(model), {algorithm.model: algorithm for algorithm in ALGORITHMS.values()}
+    if kind not in known:
+        names = sorted(each.__name__ for each in known)
+        raise ValueError(f"model must be one of {', '.join(names)}, got {kind.__name__}")
+    layers = known[kind].mean(model.policy)
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
     between = {_ACTIVATIONS.get(type(layer)) for layer in layers if not isinstance(layer, torch.nn.Linear)}
     if len(between) != 1 or None in between or len(layers) != 2 * len(linear) - 1:
         raise ValueError("only multilayer perceptrons with one kind of activation, tanh or relu, can be exported")
-    return Network(
+    network = Network(
         weights=tuple(np.ascontiguousarray(layer.weight.detach().cpu().numpy().T) for layer in linear),
         biases=tuple(layer.bias.detach().cpu().numpy().copy() for layer in linear),
         activation=str(between.pop()),
-        output=output,
+        output=known[kind].output,
     )
+    return AgentFile(name=name, algorithm=kind.__name__, environment=environment, network=network, notes=notes or {})

@@ -83,7 +83,7 @@ def save_buffer(buffer: ReplayBuffer, path: Path) -> None:
     """
     held = buffer.buffer_size if buffer.full else buffer.pos
     after = buffer.next_observations[:held]
-    other = (after != _following(buffer.observations[:held])).any(axis=-1)
+    other = (after != np.roll(buffer.observations[:held], -1, axis=0)).any(axis=-1)  # the buffer is a ring in time
     arrays = {name: getattr(buffer, name)[:held] for name in _PLAIN}
     np.savez(path, allow_pickle=False, pos=buffer.pos, full=buffer.full, other=other, after=after[other], **arrays)
 
@@ -95,11 +95,6 @@ def load_buffer(buffer: ReplayBuffer, path: Path) -> None:
         for name in _PLAIN:
             getattr(buffer, name)[:held] = saved[name]
         after = buffer.next_observations[:held]
-        after[:] = _following(buffer.observations[:held])
+        after[:] = np.roll(buffer.observations[:held], -1, axis=0)
         after[saved["other"]] = saved["after"]
         buffer.pos, buffer.full = int(saved["pos"]), bool(saved["full"])
-
-
-def _following(observations: np.ndarray) -> np.ndarray:
-    """Return what each row observed one period later; the buffer is a ring in time."""
-    return np.roll(observations, -1, axis=0)

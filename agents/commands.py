@@ -3,18 +3,17 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import tyro
 
 from hydrone_gym.cli import check_obstacles
 from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.suites import MISSIONS
 
-_IDS = {
-    "mission": "HydroneGym/Mission-v0",
-    "air-to-water": "HydroneGym/AirToWater-v0",
-    "water-to-air": "HydroneGym/WaterToAir-v0",
-}
+_Mission = Literal["mission", "air-to-water", "water-to-air"]
+_IDS = dict(zip(get_args(_Mission), MISSIONS, strict=True))
+_Vehicle = Literal["paper", "physical"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,50 +23,54 @@ class Train:
     EXTRA: ClassVar = "agents"
     _TRAINED: ClassVar = ("algorithm", "out", "seed", "steps", "recipe", "start_from", "obstacles", "vehicle")
 
+    # Recipe; ppo_shielded goes on behind the shield and wants --start-from.
     algorithm: Annotated[Literal["ppo", "ppo_shielded", "sac", "td3", "tqc"], tyro.conf.Positional] = "ppo"
-    """Recipe; ppo_shielded goes on behind the shield and wants --start-from."""
-    out: Path | None = None
-    """Run folder, runs/<algorithm>-<seed> unless given; must not hold a run already."""
-    seed: int = 0
-    """Seed of weights, missions and exploration."""
-    steps: int | None = None
-    """Transitions to learn from, the recipe's number unless given."""
-    recipe: Path | None = None
-    """YAML file of hyper-parameters to use instead of the package's."""
-    start_from: Path | None = None
-    """Run folder whose latest weights to begin with."""
+    out: Path | None = None  # Run folder, runs/<algorithm>-<seed> unless given; must not hold a run already.
+    seed: int = 0  # Seed of weights, missions and exploration.
+    steps: int | None = None  # Transitions to learn from, the recipe's number unless given.
+    recipe: Path | None = None  # YAML file of hyper-parameters to use instead of the package's.
+    start_from: Path | None = None  # Run folder whose latest weights to begin with.
+    # Number of spheres in training and evaluation; unless given the recipe's, and 20 in evaluation.
     obstacles: int | None = None
-    """Number of spheres in training and evaluation; unless given the recipe's, and 20 in evaluation."""
-    vehicle: Literal["paper", "physical"] | None = None
-    """Parameter set of the vehicle, "paper" unless given."""
+    vehicle: _Vehicle | None = None  # Parameter set of the vehicle, "paper" unless given.
+    # Go on with the run in this folder from its latest checkpoint; excludes every option above.
     resume: Path | None = None
-    """Go on with the run in this folder from its latest checkpoint; excludes every option above."""
-    num_threads: int = 1
-    """Threads of torch; with one, a seed gives the same weights again."""
-    checkpoint_every: int = 500_000
-    """Least number of steps between checkpoints."""
-    evaluation_episodes: int = 1000
-    """Held-out worlds a mission to evaluate on, 0 for none."""
-    tensorboard: bool = False
-    """Also write a log for TensorBoard; needs the extra `tensorboard`."""
-    json: bool = False
-    """Print one JSON document instead of the tables, and show no progress bar."""
+    num_threads: int = 1  # Threads of torch; with one, a seed gives the same weights again.
+    checkpoint_every: int = 500_000  # Least number of steps between checkpoints.
+    evaluation_episodes: int = 1000  # Held-out worlds a mission to evaluate on, 0 for none.
+    tensorboard: bool = False  # Also write a log for TensorBoard; needs the extra `tensorboard`.
+    json: bool = False  # Print one JSON document instead of the tables, and show no progress bar.
 
     def run(self) -> int:
         """Train, report and return the exit code."""
-        from agents import training
+        from agents.training import resume
+        from hydrone_gym.evaluation.summary import summarise
+        from hydrone_gym.evaluation.tables import print_tables, tables_of
 
-        if self.resume is not None:
-            defaults = type(self)()
-            given = [name for name in self._TRAINED if getattr(self, name) != getattr(defaults, name)]
+        if self.resume is None:
+            folder, records, scores = self._trained()
+        else:
+            given = [name for name in self._TRAINED if getattr(self, name) != getattr(Train, name)]
             if given:
                 raise ValueError(f"--resume excludes {', '.join(given)}: the run folder says what is trained")
-            return _report(self.json, self.resume, *training.resume(self.resume, progress=not self.json))
+            folder, (records, scores) = self.resume, resume(self.resume, progress=not self.json)
+        if self.json:
+            print(json.dumps({"folder": str(folder), "scores": scores}))
+            return 0
+        if records:
+            print_tables(tables_of(summarise(records)))
+        print(folder)
+        return 0
+
+    def _trained(self) -> tuple[Path, list[Record], list[dict[str, Any]]]:
+        """Train a new run; return its folder and how the agent flew."""
+        from agents.training import TrainingRun, train
+
         if self.algorithm == "ppo_shielded" and self.start_from is None:
             raise ValueError("ppo_shielded goes on with weights trained without the shield: name their --start-from")
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "vehicle": self.vehicle}
-        run = training.TrainingRun(
+        run = TrainingRun(
             folder=Path("runs") / f"{self.algorithm}-{self.seed}" if self.out is None else self.out,
             options={name: value for name, value in options.items() if value is not None},
             threads=self.num_threads,
@@ -75,7 +78,7 @@ class Train:
             **{name: getattr(self, name) for name in ("algorithm", "seed", "steps", "recipe", "start_from")},
             **{name: getattr(self, name) for name in ("checkpoint_every", "evaluation_episodes", "tensorboard")},
         )
-        return _report(self.json, run.folder, *training.train(run))
+        return run.folder, *train(run)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,27 +87,19 @@ class Demonstrate:
 
     EXTRA: ClassVar = "agents,demonstrations"
 
+    # Registered name, module:attribute, file.py:attribute or an agent's folder, also as LABEL=…
     policy: Annotated[str, tyro.conf.Positional] = "clrrt"
-    """Registered name, module:attribute, file.py:attribute or an agent's folder, also as LABEL=…"""
-    out: Path = Path("demonstrations")
-    """Folder of the datasets, one a mission."""
-    missions: tuple[Literal["mission", "air-to-water", "water-to-air"], ...] = tuple(_IDS)  # type: ignore[arg-type]
-    """What is flown: random missions, and the two experiments of the paper."""
-    flights: int = 400
-    """Flights a mission, each in a world of its own."""
-    seed: int = 6_000_000
-    """Of the first world; below 10,000,000, where the held-out worlds begin."""
-    obstacles: int = 20
-    """Number of spheres."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
-    json: bool = False
-    """Print one JSON document instead of the paths, and show no progress bar."""
+    out: Path = Path("demonstrations")  # Folder of the datasets, one a mission.
+    missions: tuple[_Mission, ...] = get_args(_Mission)  # Random missions, and the two experiments of the paper.
+    flights: int = 400  # Flights a mission, each in a world of its own.
+    seed: int = 6_000_000  # Of the first world; below 10,000,000, where the held-out worlds begin.
+    obstacles: int = 20  # Number of spheres.
+    vehicle: _Vehicle = "paper"  # Parameter set of the vehicle.
+    json: bool = False  # Print one JSON document instead of the paths, and show no progress bar.
 
     def run(self) -> int:
         """Record, report and return the exit code."""
-        from agents.demonstration_files import load_demonstrations
-        from agents.demonstrations import Recording, record
+        from agents.demonstrations import Recording, load_demonstrations, record
 
         check_obstacles(self.obstacles)
         recording = Recording(
@@ -122,72 +117,24 @@ class Demonstrate:
             arrived = sum(flight.outcome.name == "GOAL" for flight in flights)
             periods = sum(len(flight.rewards) for flight in flights)
             rows.append({"folder": str(folder), "flights": len(flights), "arrived": arrived, "periods": periods})
-        if self.json:
-            print(json.dumps(rows))
-            return 0
-        for row in rows:
-            print("{folder}: {flights} flights, {arrived} arrived, {periods} periods".format(**row))
+        told = ("{folder}: {flights} flights, {arrived} arrived, {periods} periods".format(**row) for row in rows)
+        print(json.dumps(rows) if self.json else "\n".join(told))
         return 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Clone:
-    """Learn a policy from demonstrations by imitation, evaluate it on held-out worlds and write an agent's folder."""
-
-    EXTRA: ClassVar = "agents,demonstrations"
-
-    data: Annotated[Path, tyro.conf.Positional] = Path("demonstrations")
-    """Folder of one dataset or of several."""
-    out: Path = Path("runs/clone")
-    """Folder of the agent; must not hold one already."""
-    seed: int = 0
-    """Of weights and of the order of the data."""
-    epochs: int = 400
-    """Times that every pair is learnt from."""
-    batch: int = 512
-    """Pairs a step of Adam."""
-    learning_rate: float = 1e-3
-    """At the beginning; it falls linearly to zero."""
-    evaluation_episodes: int = 1000
-    """Held-out worlds a mission to evaluate on, 0 for none."""
-    json: bool = False
-    """Print one JSON document instead of the tables, and show no progress bar."""
-
-    def run(self) -> int:
-        """Learn, report and return the exit code."""
-        from agents.cloning import Cloning, clone
-        from hydrone_gym.evaluation.run import evaluate_held_out
-
-        names = ("data", "out", "seed", "epochs", "batch", "learning_rate")
-        cloned = clone(Cloning(**{name: getattr(self, name) for name in names}, progress=not self.json))
-        flown: tuple[list[Record], list[dict[str, Any]]] = ([], [])
-        if self.evaluation_episodes > 0:
-            flown = evaluate_held_out(str(self.out), worlds=self.evaluation_episodes, options=cloned.options)
-        if not self.json:
-            print(cloned.summary())
-        return _report(self.json, self.out, *flown, cloning=cloned.notes())
 
 
 @dataclass(frozen=True, kw_only=True)
 class Failures:
     """Fly an agent in many held-out worlds, and say where and why it fails: tables, failures.csv and figures."""
 
+    # Name of a shipped agent, or a folder; for comparison also a registered policy such as straight-line.
     agent: str
-    """Name of a shipped agent, or a folder; for comparison also a registered policy such as straight-line."""
-    out: Path
-    """Folder to write to."""
-    shield: bool = False
-    """Fly behind the shield."""
-    episodes: int = 4000
-    """Worlds a mission."""
-    obstacles: int = 20
-    """Number of spheres."""
-    radii: tuple[float, float] = (0.5, 1.5)
-    """Least and greatest radius of a sphere, m."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
-    json: bool = False
-    """Print one JSON document instead of the tables, and show no progress bar."""
+    out: Path  # Folder to write to.
+    shield: bool = False  # Fly behind the shield.
+    episodes: int = 4000  # Worlds a mission.
+    obstacles: int = 20  # Number of spheres.
+    radii: tuple[float, float] = (0.5, 1.5)  # Least and greatest radius of a sphere, m.
+    vehicle: _Vehicle = "paper"  # Parameter set of the vehicle.
+    json: bool = False  # Print one JSON document instead of the tables, and show no progress bar.
 
     def run(self) -> int:
         """Fly, write everything to the folder, report and return the exit code."""
@@ -197,25 +144,9 @@ class Failures:
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
         behind = "+shield" if self.shield else ""
-        policy = f"{self.agent}{behind}"
-        if self.agent in shipped_agents():
-            policy = f"{policy}={PRETRAINED / self.agent}{behind}"
+        folder = f"={PRETRAINED / self.agent}{behind}" if self.agent in shipped_agents() else ""
         text, document = write_failure_report(
-            policy, self.out, worlds=self.episodes, options=options, progress=not self.json
+            f"{self.agent}{behind}{folder}", self.out, worlds=self.episodes, options=options, progress=not self.json
         )
         print(json.dumps(document) if self.json else text)
         return 0
-
-
-def _report(as_json: bool, folder: Path, records: list[Record], scores: list[dict[str, Any]], **more: Any) -> int:
-    """Print what came of an agent: tables and its folder, or one JSON document."""
-    from hydrone_gym.evaluation.summary import summarise
-    from hydrone_gym.evaluation.tables import print_tables, tables_of
-
-    if as_json:
-        print(json.dumps({"folder": str(folder), **more, "scores": scores}))
-        return 0
-    if records:
-        print_tables(tables_of(summarise(records)))
-    print(folder)
-    return 0

@@ -7,9 +7,9 @@ bit.
 
 import hashlib
 import json
+import os
 import re
 import shutil
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import gymnasium as gym
 import minari
 import numpy as np
+from gymnasium.envs.registration import registry
 from minari.data_collector import EpisodeBuffer
 from minari.dataset.minari_storage import MinariStorage
 from numpy.typing import NDArray
@@ -34,14 +35,14 @@ METADATA, DATA = "metadata.json", "main_data.hdf5"
 OWN, FORMAT, SHA = "hydrone_gym", 1, "sha256"
 INFOS = {"outcome": np.int64, "time": np.float64, "energy": np.float64, "clearance": np.float64}  # as stored
 _PACKAGES = (*provenance.PACKAGES, "minari")
+_KEYS = ("env_id", "options", "policy", "versions")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
     """What is flown and where it is written.
 
-    Raises:
-        ValueError: no flights, seeds that are held out for evaluation, or an option that cannot be recorded.
+    Raises ValueError for no flights, seeds that are held out for evaluation, or an option that cannot be recorded.
     """
 
     root: Path  # folder of the datasets, made if missing
@@ -71,7 +72,7 @@ class Recording:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Demonstration:
-    """One recorded flight of T periods; shapes and types are those of the module's table."""
+    """One recorded flight of T periods; shapes and types are those of the table in docs/demonstrations.md."""
 
     seed: int
     observations: dict[str, NDArray[np.float64]]
@@ -107,20 +108,18 @@ class _Notebook(gym.Wrapper):
     """Notes down an episode; actions are clipped and rounded as their space has them, then flown."""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin anew."""
         observation, info = self.env.reset(seed=seed, options=options)
         self.seen, self.infos, self.steps = [observation], [info], list[tuple[Any, ...]]()
         return observation, info
 
     def step(self, action: Any) -> Any:
-        """Fly a period and note it down."""
         box: Any = self.env.action_space
         action = np.clip(np.asarray(action, np.float32), box.low, box.high)
-        observation, reward, terminated, truncated, info = self.env.step(action)
+        step = observation, reward, terminated, truncated, info = self.env.step(action)
         self.seen.append(observation)
         self.infos.append(info)
         self.steps.append((action, float(reward), terminated, truncated))
-        return observation, reward, terminated, truncated, info
+        return step
 
 
 def demonstrate(env: gym.Env, policy: Policy, seed: int) -> Demonstration:
@@ -147,11 +146,13 @@ def record(recording: Recording) -> list[Path]:
         ValueError, TypeError: a policy that is not known, or an option that the environment refuses.
     """
     source = find_policy(recording.policy)
-    missions = {recording.root / _dataset_id(env_id, source.label): env_id for env_id in recording.missions}
-    for folder in missions:
+    label = re.sub(r"[^A-Za-z0-9_-]", "_", source.label)  # Minari's ids have no other letters, and end in a version
+    ids = {f"HydroneGym/{name.rpartition('/')[2].rpartition('-v')[0]}-{label}-v0": name for name in recording.missions}
+    folders = [recording.root / dataset_id for dataset_id in ids]
+    for folder in folders:
         if folder.exists():
             raise FileExistsError(f"{folder} exists already: name another --out, or remove it")
-    for folder, env_id in missions.items():
+    for folder, (dataset_id, env_id) in zip(folders, ids.items(), strict=True):
         env = gym.make(env_id, disable_env_checker=True, **recording.options)
         spaces: Any = env.observation_space
         empty = [key for key, space in spaces.items() if 0 in space.shape]
@@ -161,28 +162,21 @@ def record(recording: Recording) -> list[Path]:
         shutil.rmtree(partial, ignore_errors=True)
         (partial / "data").mkdir(parents=True)
         try:
-            _write((partial / "data").resolve(), _dataset_id(env_id, source.label), env, source, recording)
+            _write((partial / "data").resolve(), dataset_id, env, source, recording)
             partial.rename(folder)
         finally:
             shutil.rmtree(partial, ignore_errors=True)
             env.close()
-    return list(missions)
-
-
-def _dataset_id(env_id: str, label: str) -> str:
-    """Return Minari's id: letters, digits, "-" and "_", and a version."""
-    mission = env_id.rpartition("/")[2].rpartition("-v")[0]
-    return f"HydroneGym/{mission}-{re.sub(r'[^A-Za-z0-9_-]', '_', label)}-v0"
+    return folders
 
 
 def _write(folder: Path, dataset_id: str, env: gym.Env, source: PolicySource, recording: Recording) -> None:
     """Fly one mission and write its two files; the folder must be absolute, or Minari does not find its own files."""
     assert env.spec is not None
     storage = MinariStorage.new(folder, env.observation_space, env.action_space, env_spec=env.spec, data_format="hdf5")
-    seeds: Iterable[int] = range(recording.seed, recording.seed + recording.flights)
-    seeds = tqdm(seeds, desc=env.spec.id, unit="flight", disable=not recording.progress)
-    flights = (demonstrate(env, source.make(env, seed), seed) for seed in seeds)
-    storage.update_episodes(EpisodeBuffer(**vars(flight)) for flight in flights)
+    seeds = range(recording.seed, recording.seed + recording.flights)
+    bar = tqdm(seeds, desc=env.spec.id, unit="flight", disable=not recording.progress)
+    storage.update_episodes(EpisodeBuffer(**vars(demonstrate(env, source.make(env, seed), seed))) for seed in bar)
     described = {
         "format": FORMAT,
         "env_id": env.spec.id,
@@ -203,3 +197,67 @@ def _write(folder: Path, dataset_id: str, env: gym.Env, source: PolicySource, re
             SHA: hashlib.sha256((folder / DATA).read_bytes()).hexdigest(),
         }
     )
+
+
+def find_datasets(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the folders of the datasets at or below a path, in order; raises FileNotFoundError if there are none."""
+    found = sorted(text.parent.parent for text in Path(path).glob(f"**/data/{METADATA}"))
+    found = [folder for folder in found if not folder.name.startswith(".")]
+    if not found:
+        raise FileNotFoundError(f"no demonstrations at {os.fspath(path)}: record some with `hydrone demonstrate`")
+    return found
+
+
+def load_demonstrations(path: str | os.PathLike[str]) -> Demonstrations:
+    """Read a dataset, in memory as a whole, from its folder: the one that holds `data/`.
+
+    Raises:
+        FileNotFoundError: no dataset there.
+        ValueError: naming the folder, for one that is foreign or damaged, or for an environment that is not this one's.
+    """
+    folder = Path(path)
+    for name in (METADATA, DATA):
+        if not (folder / "data" / name).is_file():
+            raise FileNotFoundError(f"no demonstrations at {folder}: {folder / 'data' / name} does not exist")
+    try:
+        return _read(folder / "data")
+    except (AssertionError, AttributeError, KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise ValueError(f"{folder}: {error}") from None
+
+
+def _read(data: Path) -> Demonstrations:
+    """Check and read; raises ValueError, or what Minari and HDF5 raise for files that are none of theirs."""
+    metadata = json.loads((data / METADATA).read_text(encoding="utf-8"))
+    own = metadata.get(OWN) if isinstance(metadata, dict) else None
+    if not isinstance(own, dict) or own.get("format") != FORMAT:
+        raise ValueError(f'no demonstrations of this project: "{OWN}" in {METADATA} must have the format {FORMAT}')
+    missing = [key for key in _KEYS if key not in own]
+    if missing:
+        raise ValueError(f"{METADATA} lacks {', '.join(missing)}")
+    sha256 = hashlib.sha256((data / DATA).read_bytes()).hexdigest()
+    if sha256 != metadata.get(SHA):
+        raise ValueError(f"{DATA} is damaged or another one: its SHA-256 differs from the one noted")
+    if own["env_id"] not in registry or not str(own["env_id"]).startswith("HydroneGym/"):
+        raise ValueError(f"flown on {own['env_id']!r}, an environment that is not registered here")
+    storage = MinariStorage.read(data)
+    env = gym.make(own["env_id"], disable_env_checker=True, **own["options"])
+    indices = range(int(metadata["total_episodes"]))
+    pairs = zip(storage.get_episodes(indices), storage.get_episode_metadata(indices), strict=True)
+    flights = tuple(_flight(episode, int(about["seed"]), env) for episode, about in pairs)
+    env.close()
+    return Demonstrations(**{key: own[key] for key in _KEYS}, sha256=sha256, flights=flights)
+
+
+def _flight(episode: dict[str, Any], seed: int, env: gym.Env) -> Demonstration:
+    """Check one flight against the spaces of its environment; ValueError if it does not fit."""
+    name = f"episode {episode['id']}"
+    flight = Demonstration(seed=seed, **{key: value for key, value in episode.items() if key != "id"})
+    ends, first = flight.terminations | flight.truncations, {key: seen[0] for key, seen in flight.observations.items()}
+    lengths = {len(seen) - 1 for seen in (*flight.observations.values(), *(flight.infos[key] for key in INFOS))}
+    lengths |= {len(flight.actions), len(flight.rewards), len(ends)}
+    if len(lengths) > 1 or ends.sum() != 1 or not ends[-1]:
+        raise ValueError(f"{name}: its arrays must be equally long, and it must end once, with its last period")
+    fits = first in env.observation_space and all(action in env.action_space for action in flight.actions)
+    if not fits or not np.isfinite(flight.rewards).all():
+        raise ValueError(f"{name} does not fit the spaces of {env.spec and env.spec.id}")
+    return flight

@@ -1,5 +1,6 @@
 """A multilayer perceptron in float32, as a kernel: a row's output does not depend on the rows beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,11 @@ from numpy.typing import NDArray
 
 from hydrone_gym._jit import kernel
 
-OUTPUTS = ("linear", "tanh")
+_ACTIVATIONS: dict[str, Callable[[NDArray], NDArray]] = {
+    "linear": lambda x: x,
+    "relu": lambda x: np.maximum(x, np.float32(0.0)),
+    "tanh": np.tanh,
+}
 
 
 @kernel
@@ -30,8 +35,7 @@ def _dense(x: NDArray, weights: NDArray, bias: NDArray, out: NDArray) -> None:
 class Network:
     """Layers with an activation between them.
 
-    Raises:
-        ValueError: layers that do not fit each other, numbers that are not finite, an unknown activation.
+    Raises ValueError for layers that do not fit each other, numbers that are not finite, an unknown activation.
     """
 
     weights: tuple[NDArray[np.float32], ...]  # (inputs, outputs) float32 of each layer
@@ -41,7 +45,7 @@ class Network:
 
     def __post_init__(self) -> None:
         """Check that the layers fit."""
-        if self.activation not in ("tanh", "relu") or self.output not in OUTPUTS:
+        if self.activation not in ("tanh", "relu") or self.output not in ("linear", "tanh"):
             raise ValueError(f"unknown activation {self.activation!r} or output {self.output!r}")
         if not self.weights or len(self.weights) != len(self.biases):
             raise ValueError("a network needs as many biases as weights, and at least one")
@@ -66,13 +70,5 @@ class Network:
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases)):
             out = np.empty((len(values), len(bias)), np.float32)
             _dense(values, weight, bias, out)
-            last = k == len(self.weights) - 1
-            values = _activate(out, self.output if last else self.activation)
+            values = _ACTIVATIONS[self.output if k == len(self.weights) - 1 else self.activation](out)
         return values
-
-
-def _activate(values: NDArray[np.float32], name: str) -> NDArray[np.float32]:
-    """Apply "tanh", "relu" or "linear" to every entry."""
-    if name == "tanh":
-        return np.tanh(values)
-    return np.maximum(values, np.float32(0.0)) if name == "relu" else values

@@ -3,7 +3,6 @@
 import csv
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
@@ -22,14 +21,10 @@ LINES = 500  # of a curve at most; a rollout that is longer than its share of th
 
 
 class RunLog(BaseCallback):
-    """Writes `curve.csv` and checkpoints into a run folder.
+    """Writes `curve.csv` and checkpoints into a run folder, and shows a bar.
 
-    Args:
-        folder: of the run.
-        total: steps of the whole training, for the bar.
-        every: least number of steps between checkpoints.
-        progress: whether to show the bar.
-        spent: wall-clock and processor seconds used before this process took over.
+    The bar counts to `total` steps; `every` is the least number of steps between checkpoints, `spent` the wall-clock
+    and processor seconds used before this process took over.
     """
 
     def __init__(
@@ -40,8 +35,6 @@ class RunLog(BaseCallback):
         self.folder = folder
         self._total, self._every, self._progress, self._spent = total, every, progress, spent
         self._ended: list[tuple[int, float, int]] = []  # outcome, return, periods since the last line
-        self._saved_at = -every
-        self._written_at = 0
 
     def _seconds(self) -> tuple[float, float]:
         wall, cpu = time.perf_counter() - self._began[0], time.process_time() - self._began[1]
@@ -49,22 +42,15 @@ class RunLog(BaseCallback):
 
     def _on_training_start(self) -> None:
         self._began = (time.perf_counter(), time.process_time())
-        self._cut_curve()
-        self._bar = tqdm(
-            total=self._total, initial=self.num_timesteps, unit="step", unit_scale=True, disable=not self._progress
-        )
-        self._saved_at = self.num_timesteps if self.num_timesteps else -self._every
-        self._written_at = self.num_timesteps
-
-    def _cut_curve(self) -> None:
-        """Write the head of the curve, or drop lines later than the checkpoint the training goes on from."""
-        path = self.folder / CURVE
+        self._saved_at, self._written_at = self.num_timesteps or -self._every, self.num_timesteps
+        shown = {"unit": "step", "unit_scale": True, "disable": not self._progress}
+        self._bar = tqdm(total=self._total, initial=self.num_timesteps, **shown)
         lines: list[list[str]] = []
-        if path.exists():
-            with path.open(newline="", encoding="utf-8") as stream:
+        if (self.folder / CURVE).exists():  # lines later than the checkpoint that the training goes on from are dropped
+            with (self.folder / CURVE).open(newline="", encoding="utf-8") as stream:
                 lines = [line for line in list(csv.reader(stream))[1:] if int(line[0]) <= self.num_timesteps]
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            csv.writer(stream).writerows([list(COLUMNS), *lines])
+        with (self.folder / CURVE).open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows([COLUMNS, *lines])
 
     def _on_rollout_start(self) -> None:
         """Between an update and a rollout: the one moment at which nothing is under way but the episodes.
@@ -92,13 +78,16 @@ class RunLog(BaseCallback):
             self._write_line()
 
     def _write_line(self) -> None:
-        line = _summary(self._ended)
-        wall, cpu = self._seconds()
-        with (self.folder / CURVE).open("a", newline="", encoding="utf-8") as stream:
-            cells = [self.num_timesteps, f"{wall:.2f}", f"{cpu:.2f}", len(self._ended), *line]
-            csv.writer(stream).writerow(cells)
+        """Write success rate, mean return, mean periods and share of each failure; empty cells when none ended."""
+        cells = [self.num_timesteps, *(f"{seconds:.2f}" for seconds in self._seconds()), len(self._ended)]
+        means = [""] * (3 + len(FAILURES))
         if self._ended:
-            self._bar.set_postfix_str(f"success {100.0 * float(line[0]):.1f} %")
+            outcomes, returns, periods = map(np.array, zip(*self._ended))
+            shares = [outcomes == Outcome[name] for name in ("GOAL", *FAILURES)]
+            means = [f"{np.mean(values):.5f}" for values in (shares[0], returns, periods, *shares[1:])]
+            self._bar.set_postfix_str(f"success {100.0 * float(means[0]):.1f} %")
+        with (self.folder / CURVE).open("a", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerow([*cells, *means])
         self._ended, self._written_at = [], self.num_timesteps
 
     def _on_training_end(self) -> None:
@@ -106,16 +95,6 @@ class RunLog(BaseCallback):
             self._write_line()
         self.checkpoint()
         self._bar.close()
-
-
-def _summary(ended: list[tuple[int, float, int]]) -> list[Any]:
-    """Success rate, mean return, mean periods and the share of each failure; empty cells when none ended."""
-    if not ended:
-        return [""] * (3 + len(FAILURES))
-    outcomes = np.array([outcome for outcome, _, _ in ended])
-    shares = [np.mean(outcomes == Outcome[name]) for name in FAILURES]
-    means = [np.mean([entry[k] for entry in ended]) for k in (1, 2)]
-    return [f"{value:.5f}" for value in (np.mean(outcomes == Outcome.GOAL), *means, *shares)]
 
 
 def draw_curve(folder: Path) -> Path:
@@ -129,9 +108,7 @@ def draw_curve(folder: Path) -> Path:
     for name, colour in zip(("success", *(failure.lower() for failure in FAILURES)), _COLOURS, strict=True):
         shares = [100.0 * float(line[name]) for line in lines]
         axes.plot(steps, shares, color=colour, linewidth=1.0, label=name.replace("_", " "))
-    axes.set_xlabel("steps (million)")
-    axes.set_ylabel("episodes, while exploring (%)")
-    axes.set_ylim(0, 100)
+    axes.set(xlabel="steps (million)", ylabel="episodes, while exploring (%)", ylim=(0, 100))
     axes.grid(alpha=0.3)
     axes.legend()
     path = folder / "curve.png"

@@ -18,9 +18,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from agents.agent_file import read_yaml, save_agent
 from agents.algorithms import ALGORITHMS, export_agent
 from agents.checkpoint import MODEL, checkpoints, load_checkpoint
-from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, Recipe, load_recipe
 from agents.run_log import CHECKPOINTS, RunLog, draw_curve
+from agents.vec_env import MissionMix
 from hydrone_gym.evaluation.provenance import versions
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run import evaluate_held_out
@@ -36,8 +36,7 @@ PACKAGES = ("hydrone-gym", "stable_baselines3", "sb3_contrib", "torch", "gymnasi
 class TrainingRun:
     """What is trained, where, and from what.
 
-    Raises:
-        ValueError: an option out of range, or TensorBoard asked for and not installed.
+    Raises ValueError for an option out of range, or TensorBoard asked for and not installed.
     """
 
     folder: Path  # run folder, made by `train`; must not hold a run already
@@ -67,11 +66,6 @@ class TrainingRun:
         if self.tensorboard and find_spec("tensorboard") is None:
             raise ValueError('tensorboard is not installed: pip install "hydrone-gym[tensorboard]"')
 
-    def loaded_recipe(self) -> Recipe:
-        """Return the recipe with this run's number of steps."""
-        recipe = load_recipe(self.algorithm, self.recipe)
-        return recipe if self.steps is None else dataclasses.replace(recipe, steps=self.steps)
-
 
 def train(run: TrainingRun) -> Flown:
     """Train from the beginning and return how the agent flew in held-out worlds.
@@ -80,18 +74,21 @@ def train(run: TrainingRun) -> Flown:
         FileExistsError: the folder holds a run already; go on with it by `resume`.
         ValueError, TypeError: a recipe or option that is refused.
     """
-    recipe = run.loaded_recipe()
+    recipe = load_recipe(run.algorithm, run.recipe)
+    if run.steps is not None:
+        recipe = dataclasses.replace(recipe, steps=run.steps)
     if (run.folder / CONFIG).exists():
         raise FileExistsError(f"{run.folder} holds a run already: resume it, or name another folder")
     torch.set_num_threads(run.threads)
     rows = MissionMix(recipe.missions, {**recipe.environment, **run.options}, shield=recipe.shield)
-    model = ALGORITHMS[run.algorithm].model(
-        recipe.policy, rows, **recipe_arguments(recipe), seed=run.seed, device="cpu"
-    )
+    model = ALGORITHMS[run.algorithm].model(recipe.policy, rows, **recipe.arguments(), seed=run.seed, device="cpu")
     if run.start_from is not None:
         model.set_parameters(_latest(run.start_from) / MODEL, device="cpu")
     run.folder.mkdir(parents=True, exist_ok=True)
-    _write_config(run, recipe)
+    told = {name: str(value) if isinstance(value, Path) else value for name, value in dataclasses.asdict(run).items()}
+    content = {"run": told, "recipe": dataclasses.asdict(recipe)}
+    (run.folder / CONFIG).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    (run.folder / "versions.json").write_text(json.dumps(versions(PACKAGES), indent=1) + "\n", encoding="utf-8")
     return _learn(run, recipe, model, (0.0, 0.0))
 
 
@@ -110,13 +107,6 @@ def resume(folder: Path, *, progress: bool = True) -> Flown:
     torch.set_num_threads(run.threads)
     model, extra = load_checkpoint(_latest(folder), ALGORITHMS[run.algorithm].model)
     return _learn(run, recipe, model, extra["spent"])
-
-
-def recipe_arguments(recipe: Recipe) -> dict[str, Any]:
-    """Complete the recipe's settings: rectifiers between layers, cheaper than PPO's tanh; more episodes remembered."""
-    arguments = recipe.arguments()
-    policy = {"activation_fn": torch.nn.ReLU, **arguments.get("policy_kwargs", {})}
-    return {"stats_window_size": 1000, **arguments, "policy_kwargs": policy}
 
 
 def _latest(folder: Path) -> Path:
@@ -144,12 +134,3 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
         flown = evaluate_held_out(policy, worlds=episodes, options=run.options)
     (run.folder / "evaluation.json").write_text(json.dumps(flown[1], indent=1) + "\n", encoding="utf-8")
     return flown
-
-
-def _write_config(run: TrainingRun, recipe: Recipe) -> None:
-    """Write what the run was started with."""
-    described = dataclasses.asdict(run)
-    described = {name: str(value) if isinstance(value, Path) else value for name, value in described.items()}
-    content = {"run": described, "recipe": dataclasses.asdict(recipe)}
-    (run.folder / CONFIG).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    (run.folder / "versions.json").write_text(json.dumps(versions(PACKAGES), indent=1) + "\n", encoding="utf-8")

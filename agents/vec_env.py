@@ -1,7 +1,7 @@
-"""The native vector environment as a Stable-Baselines3 `VecEnv`."""
+"""The native vector environment as a Stable-Baselines3 `VecEnv`: rows of one mission or of several, shielded or not."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -10,11 +10,38 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from hydrone_gym.envs.reward import SCALE, TIME
 from hydrone_gym.envs.vector_env import HydroneVectorEnv
+from hydrone_gym.perception.perceived import Perceived
+from planners.shield import Shield
+
+INTERVENTION = SCALE * TIME  # reward of a period in which the shield flew another reference: as if it were lost
 
 
-class HydroneVecEnv(VecEnv):
-    """Many missions for Stable-Baselines3: `PPO("MlpPolicy", HydroneVecEnv("HydroneGym/Mission-v0", 256))` trains.
+class ShieldFilter:
+    """Lets references through that the shield lets pass, for rows of one environment.
+
+    `choice` (n,) tells what it did in the last period, as in `planners.shield.ShieldState`.
+    """
+
+    def __init__(self, env: HydroneVectorEnv) -> None:
+        """Shield the rows of an environment."""
+        self._shield = Shield.for_env(None, env)
+        self._held = np.zeros((env.num_envs, 4))
+        self.choice = np.zeros(env.num_envs, np.int64)
+        env.filter_references(self)
+
+    def __call__(
+        self, perceived: Perceived, references: NDArray[np.float64], starting: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """Return the references (n, 4) to fly; rows that begin rest, so where they are is the verified hover."""
+        held = np.where(starting[:, None], perceived.reference, self._held)
+        sent, self._held, self.choice = self._shield.check(perceived.observation(), references, held)
+        return sent
+
+
+class MissionMix(VecEnv):
+    """Rows of several missions, one mission after the other: one model learns all at once.
 
     Rows are reset at once when their episode ends, as Stable-Baselines3 expects. The info of an ended row holds
     `terminal_observation`, `TimeLimit.truncated`, `is_success`, `outcome` (an int), `time` (s), `energy` (J),
@@ -22,47 +49,40 @@ class HydroneVecEnv(VecEnv):
     `VecMonitor` is needed; the other infos are empty.
 
     Args:
-        env_id: a registered id of this project.
-        num_envs: number of rows.
-        interface: "egocentric" for learners, or "world".
-        autoreset_mode must not be given; every other keyword of `HydroneVectorEnv` may be.
+        missions: rows an environment id.
+        options: keywords of `HydroneVectorEnv` but `autoreset_mode`, the same for all; `interface` is "egocentric",
+            for learners, unless given.
+        shield: whether they fly behind the shield; `INTERVENTION` is then added to the reward where it intervenes.
+
+    Raises:
+        TypeError, ValueError: no missions at all, an id of another project, or an option that is refused.
     """
 
-    def __init__(self, env_id: str, num_envs: int = 256, *, interface: str = "egocentric", **options: Any) -> None:
-        """Make the vector environment; raises TypeError or ValueError for an option it refuses."""
-        made = gym.make_vec(
-            env_id,
-            num_envs=num_envs,
-            vectorization_mode="vector_entry_point",
-            interface=interface,
-            autoreset_mode=AutoresetMode.SAME_STEP,
-            **options,
-        )
-        if not isinstance(made, HydroneVectorEnv):
-            raise TypeError(f"env_id must name a HyDrone environment, got {env_id!r}")
-        self.env = made
-        super().__init__(num_envs, made.single_observation_space, made.single_action_space)
-        self._actions: NDArray | None = None
-        self._returns = np.zeros(num_envs)
-        self._lengths = np.zeros(num_envs, np.int64)
+    def __init__(
+        self, missions: Mapping[str, int], options: Mapping[str, Any] | None = None, *, shield: bool = False
+    ) -> None:
+        """Make the vector environments."""
+        if not missions:
+            raise ValueError("missions must name at least one environment")
+        self.parts = [_made(env_id, rows, options or {}) for env_id, rows in missions.items()]
+        self.shields = [ShieldFilter(part) for part in self.parts] if shield else []
+        *self._firsts, count = np.cumsum([0, *missions.values()]).tolist()  # row that each part begins with
+        super().__init__(count, self.parts[0].single_observation_space, self.parts[0].single_action_space)
+        self._returns, self._lengths = np.zeros(count), np.zeros(count, np.int64)
         self._made_at = time.perf_counter()
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in every row; seeds given by `seed` are used once."""
-        observation = self.begin(self._seeds, self._options)
+        observations = []
+        for part, first in zip(self.parts, self._firsts):
+            rows = slice(first, first + part.num_envs)
+            seeds = None if all(seed is None for seed in self._seeds[rows]) else self._seeds[rows]
+            options = next((option for option in self._options[rows] if option), None)
+            observations.append(part.reset(seed=seeds, options=options)[0])
         self._reset_seeds()
         self._reset_options()
-        return observation
-
-    def begin(self, seeds: Sequence[int | None], options: Sequence[dict[str, Any]]) -> VecEnvObs:
-        """Begin an episode in every row, with a seed (None: its stream goes on) and reset options each."""
-        given = None if all(seed is None for seed in seeds) else seeds
-        chosen = next((option for option in options if option), None)
-        observation, _ = self.env.reset(seed=given, options=chosen)
-        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        self._returns[:] = 0.0
-        self._lengths[:] = 0
-        return observation
+        self._returns[:], self._lengths[:] = 0.0, 0
+        return _joined(observations)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for `step_wait`."""
@@ -70,49 +90,53 @@ class HydroneVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Fly one period in every row."""
-        observation, rewards, terminated, truncated, info = self.env.step(self._actions)  # type: ignore[arg-type]
-        self._returns += rewards
+        steps = [part.step(sent) for part, sent in zip(self.parts, np.split(self._actions, self._firsts[1:]))]
+        observations, rewards, terminated, truncated, told = zip(*steps)
+        earned, done = np.concatenate(rewards), np.concatenate(terminated) | np.concatenate(truncated)
+        self._returns += earned
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        done = terminated | truncated
-        for row in np.flatnonzero(done):
-            infos[row] = self._ended(int(row), bool(truncated[row]), info)
-        self._returns[done] = 0.0
-        self._lengths[done] = 0
-        return observation, rewards.astype(np.float32), done, infos
+        for part, first, cut, info in zip(self.parts, self._firsts, truncated, told):
+            for k in np.flatnonzero(done[first : first + part.num_envs]).tolist():
+                infos[first + k] = self._ended(first + k, k, info) | {"TimeLimit.truncated": bool(cut[k])}
+        self._returns[done], self._lengths[done] = 0.0, 0
+        earned = earned.astype(np.float32)
+        if self.shields:
+            intervened = np.concatenate([shield.choice for shield in self.shields]) != 0
+            earned += np.where(intervened, INTERVENTION, 0.0).astype(np.float32)
+        return _joined(observations), earned, done, infos
 
-    def _ended(self, row: int, truncated: bool, info: dict[str, Any]) -> dict[str, Any]:
-        """Return the info of a row whose episode ended."""
-        last = info["final_info"]
-        elapsed = time.perf_counter() - self._made_at
+    def _ended(self, row: int, k: int, info: dict[str, Any]) -> dict[str, Any]:
+        """Return the info of a row whose episode ended, the k-th of its part."""
+        last, elapsed = info["final_info"], time.perf_counter() - self._made_at
         return {
-            "terminal_observation": info["final_obs"][row],
-            "TimeLimit.truncated": truncated,
-            "is_success": bool(last["is_success"][row]),
-            "outcome": int(last["outcome"][row]),
-            "time": float(last["time"][row]),
-            "energy": float(last["energy"][row]),
-            "clearance": float(last["clearance"][row]),
+            "terminal_observation": info["final_obs"][k],
+            "is_success": bool(last["is_success"][k]),
+            "outcome": int(last["outcome"][k]),
+            **{key: float(last[key][k]) for key in ("time", "energy", "clearance")},
             "episode": {"r": float(self._returns[row]), "l": int(self._lengths[row]), "t": elapsed},
         }
 
     def close(self) -> None:
-        """Close the environment."""
-        self.env.close()
+        """Close the environments."""
+        for part in self.parts:
+            part.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the vector environment, once a row: rows share it."""
-        value = getattr(self.env, attr_name)
-        return [value for _ in self._get_indices(indices)]
+        """Return an attribute of the vector environments, once a row: rows share it."""
+        return self._each_row((getattr(part, attr_name) for part in self.parts), indices)
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Refuse: rows share their options, which are fixed when the environment is made."""
         raise AttributeError(f"{attr_name} cannot be set: the options of HydroneVecEnv are fixed when it is made")
 
     def env_method(self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the vector environment once and return its value for each row asked for."""
-        value = getattr(self.env, method_name)(*args, **kwargs)
-        return [value for _ in self._get_indices(indices)]
+        """Call a method of each vector environment once and return its value for each row asked for."""
+        return self._each_row((getattr(part, method_name)(*args, **kwargs) for part in self.parts), indices)
+
+    def _each_row(self, values: Iterable[Any], indices: VecEnvIndices) -> list[Any]:
+        rows = [value for part, value in zip(self.parts, values) for _ in range(part.num_envs)]
+        return [rows[row] for row in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
         """Rows are not wrapped one by one."""
@@ -120,5 +144,33 @@ class HydroneVecEnv(VecEnv):
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         """Return a picture of each row, None without `render_mode="rgb_array"`."""
-        pictures: Any = self.env.render()
-        return [None] * self.num_envs if pictures is None else list(pictures)
+        pictures: Any = [part.render() or [None] * part.num_envs for part in self.parts]
+        return [picture for part in pictures for picture in part]
+
+
+class HydroneVecEnv(MissionMix):
+    """Many rows of one mission: `PPO("MlpPolicy", HydroneVecEnv("HydroneGym/Mission-v0", 256))` trains.
+
+    Arguments are an id of this project, the number of rows, and what `MissionMix` takes. `env` is what flies.
+    """
+
+    def __init__(self, env_id: str, num_envs: int = 256, *, shield: bool = False, **options: Any) -> None:
+        """Make the vector environment; raises TypeError or ValueError for an option it refuses."""
+        super().__init__({env_id: num_envs}, options, shield=shield)
+        self.env = self.parts[0]
+
+
+def _made(env_id: str, rows: int, options: Mapping[str, Any]) -> HydroneVectorEnv:
+    """Make one vector environment."""
+    told = {"interface": "egocentric", **options}
+    made = gym.make_vec(env_id, rows, "vector_entry_point", autoreset_mode=AutoresetMode.SAME_STEP, **told)
+    if not isinstance(made, HydroneVectorEnv):
+        raise TypeError(f"env_id must name a HyDrone environment, got {env_id!r}")
+    return made
+
+
+def _joined(observations: Sequence[Any]) -> Any:
+    """Put the observations of parts together, one after the other."""
+    if isinstance(observations[0], dict):
+        return {key: np.concatenate([seen[key] for seen in observations]) for key in observations[0]}
+    return np.concatenate(observations)

@@ -4,9 +4,8 @@ import torch
 from stable_baselines3.common.callbacks import CallbackList
 
 from agents.algorithms import ALGORITHMS
-from agents.mission_mix import MissionMix
 from agents.recipe import load_recipe
-from agents.training import recipe_arguments
+from agents.vec_env import MissionMix
 from benchmarks.timing import Contestant
 
 BEFORE = 8  # updates: until then rows crash more than they fly
@@ -17,7 +16,7 @@ def contestants() -> list[Contestant]:
     torch.set_num_threads(1)
     recipe = load_recipe("ppo")
     rows = MissionMix(recipe.missions, recipe.environment)
-    model = ALGORITHMS["ppo"].model(recipe.policy, rows, **recipe_arguments(recipe), seed=0, device="cpu")
+    model = ALGORITHMS["ppo"].model(recipe.policy, rows, **recipe.arguments(), seed=0, device="cpu")
     update = model.n_steps * rows.num_envs
     model.learn(BEFORE * update)
     callback = CallbackList([])  # rollouts must be given one

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.failures.flights import FailedFlight
-from agents.failures.worlds import share_of_way
 from hydrone_gym.evaluation.flight import Flight
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.surface import in_air
@@ -102,9 +101,10 @@ class Failure:
 def examine(failed: FailedFlight) -> Failure:
     """Work out why a flight failed."""
     flight, world = failed.flight, failed.world
-    end, contact = _end(flight, world), _contact(failed)
+    start, goal = np.array(flight.scenario.start[:3]), np.array(flight.scenario.goal)
+    share = (flight.states[:, :3] - start) @ (goal - start) / ((goal - start) @ (goal - start))
+    end, contact = _end(flight, world, float(share[-1])), _contact(failed)
     chance = _last_chance(failed, contact)
-    share = share_of_way(flight.states[:, :3], flight.scenario.start[:3], flight.scenario.goal)
     return Failure(
         mission=failed.mission,
         seed=failed.seed,
@@ -119,8 +119,8 @@ def examine(failed: FailedFlight) -> Failure:
     )
 
 
-def _end(flight: Flight, world: World) -> End:
-    """Describe the last instant of a flight."""
+def _end(flight: Flight, world: World, share: float) -> End:
+    """Describe the last instant of a flight, at a share of the way."""
     states, last = flight.trace.states, flight.trace.states[-1]
     outside = np.flatnonzero(np.abs(states[:, 2]) > world.zone)
     entry = int(outside[-1]) + 1  # missions begin outside the zone
@@ -132,20 +132,10 @@ def _end(flight: Flight, world: World) -> End:
     speed, climb, tilt = float(np.hypot(*last[6:8])), float(last[8]), float(np.arccos(np.cos(last[3:5]).prod()))
     if flight.outcome is Outcome.ROUGH_TRANSITION:
         speed, tilt, climb = (flight.transitions[-1][key] for key in ("lateral_speed", "tilt", "vertical_speed"))
+    entry_speed = float(np.hypot(*states[entry, 6:8])) if inside else None
+    medium = "air" if in_air(last[2]) else "water"
     x, y, z = last[:3].tolist()
-    return End(
-        time_s=flight.time,
-        x_m=x,
-        y_m=y,
-        z_m=z,
-        share_of_way=float(share_of_way(last[None, :3], flight.scenario.start[:3], flight.scenario.goal)[0]),
-        part=part,
-        medium="air" if in_air(last[2]) else "water",
-        horizontal_speed_m_s=speed,
-        vertical_speed_m_s=climb,
-        tilt_deg=float(np.degrees(tilt)),
-        zone_entry_speed_m_s=float(np.hypot(*states[entry, 6:8])) if inside else None,
-    )
+    return End(flight.time, x, y, z, share, part, medium, speed, climb, float(np.degrees(tilt)), entry_speed)
 
 
 def _contact(failed: FailedFlight) -> Contact | None:
@@ -157,27 +147,19 @@ def _contact(failed: FailedFlight) -> Contact | None:
     sphere = int(np.argmin(gaps_along(before[:3], last[:3], flight.scenario.obstacles)))
     centre, radius = flight.scenario.obstacles[sphere, :3], float(flight.scenario.obstacles[sphere, 3])
     toward = (centre - last[:3]) / np.linalg.norm(centre - last[:3])
-    since = failed.known[sphere]
-    return Contact(
-        sphere,
-        radius,
-        float(np.degrees(np.arcsin(np.clip(toward[2], -1.0, 1.0)))),
-        float(last[6:9] @ toward),
-        flight.time - float(since) if np.isfinite(since) else None,
-    )
+    elevation = float(np.degrees(np.arcsin(np.clip(toward[2], -1.0, 1.0))))
+    known = flight.time - float(failed.known[sphere])
+    return Contact(sphere, radius, elevation, float(last[6:9] @ toward), known if np.isfinite(known) else None)
 
 
 def _last_chance(failed: FailedFlight, contact: Contact | None) -> Chance | None:
     """Find the last decision at which a safe stop could be chosen."""
-    chances = np.flatnonzero(failed.stoppable) if failed.stoppable is not None else np.zeros(0, np.int64)
+    chances = np.flatnonzero(failed.stoppable)
     if not len(chances):
         return None
-    decision = int(chances[-1])
-    time = decision * failed.period
+    time, speed = chances[-1] * failed.period, float(np.linalg.norm(failed.flight.states[chances[-1], 6:9]))
     return Chance(
-        failed.flight.time - time,
-        float(np.linalg.norm(failed.flight.states[decision, 6:9])),
-        None if contact is None else bool(failed.known[contact.sphere] <= time),
+        float(failed.flight.time - time), speed, None if contact is None else bool(failed.known[contact.sphere] <= time)
     )
 
 
@@ -185,7 +167,13 @@ def _cause(flight: Flight, world: World, end: End, contact: Contact | None, chan
     """Put a name to it."""
     sliding = end.part in (FROM_AIR, FROM_WATER) and end.horizontal_speed_m_s > abs(end.vertical_speed_m_s)
     if contact is not None:
-        return _cause_of_contact(end, sliding, contact, chance is not None and bool(chance.known_at_last_chance))
+        in_time = chance is not None and bool(chance.known_at_last_chance)  # known when the vehicle could still stop
+        if contact.known_s is None:
+            return NEVER
+        if sliding:
+            return SLID if in_time else SLID_LATE
+        seen = ROSE_OR_SANK if end.part in (FROM_AIR, FROM_WATER) else SEEN
+        return seen if in_time else LATE
     if flight.outcome is Outcome.OUT_OF_BOUNDS:
         return SLID_OUT if sliding else LEFT
     if flight.outcome is Outcome.ROUGH_TRANSITION:
@@ -195,17 +183,6 @@ def _cause(flight: Flight, world: World, end: End, contact: Contact | None, chan
     if flight.outcome is Outcome.TIMEOUT:
         return _cause_of_timeout(flight, end)
     return DIVERGED
-
-
-def _cause_of_contact(end: End, sliding: bool, contact: Contact, in_time: bool) -> str:
-    """Say why a sphere was touched; `in_time`: it was known when the vehicle could still stop."""
-    if contact.known_s is None:
-        return NEVER
-    if sliding:
-        return SLID if in_time else SLID_LATE
-    if not in_time:
-        return LATE
-    return ROSE_OR_SANK if end.part in (FROM_AIR, FROM_WATER) else SEEN
 
 
 def _cause_of_timeout(flight: Flight, end: End) -> str:

@@ -1,11 +1,12 @@
 """Failures as pictures: where flights ended, how, and in which worlds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from agents.failures import causes
@@ -16,10 +17,6 @@ from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.rendering import style
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.world import World
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # Shape and colour tell causes apart, each alone.
 _MARKS = {
@@ -57,10 +54,8 @@ def draw_where(failures: Sequence[Failure], missions: Sequence[str], world: Worl
         for failure in those:
             panel.plot(*failure.path.T, color=_GREY, linewidth=0.5, alpha=min(1.0, 8.0 / len(those)))
         _mark(panel, those, [(failure.end.share_of_way, failure.end.z_m) for failure in those])
-        panel.set_title(f"{short_name(mission)}: {len(those)} failures")
-        panel.set_xlabel("share of the way")
-        panel.set_xlim(-0.15, 1.15)
-        panel.set_ylim(world.lower[2], world.upper[2])
+        panel.set(title=f"{short_name(mission)}: {len(those)} failures", xlabel="share of the way")
+        panel.set(xlim=(-0.15, 1.15), ylim=(world.lower[2], world.upper[2]))
     panels[0].set_ylabel("height z (m)")
     return _finished(figure, panels)
 
@@ -71,14 +66,13 @@ def draw_how(failures: Sequence[Failure]) -> Figure:
     moving = [failure for failure in failures if failure.outcome is not Outcome.TIMEOUT]
     panels[0].axhline(0.0, color=_GREY, linewidth=0.8)
     _mark(panels[0], moving, [(f.end.horizontal_speed_m_s, f.end.vertical_speed_m_s) for f in moving])
-    panels[0].set_xlabel("horizontal speed at the end (m/s)")
-    panels[0].set_ylabel("vertical speed at the end (m/s)")
-    known, chance, those = [], [], []
-    for failure in failures:
-        if failure.contact is not None and failure.chance is not None and failure.contact.known_s is not None:
-            known.append(failure.contact.known_s)
-            chance.append(failure.chance.last_chance_s)
-            those.append(failure)
+    panels[0].set(xlabel="horizontal speed at the end (m/s)", ylabel="vertical speed at the end (m/s)")
+    those, known, chance = [], [], []
+    for f in failures:
+        if f.contact is not None and f.chance is not None and f.contact.known_s is not None:
+            those.append(f)
+            known.append(f.contact.known_s)
+            chance.append(f.chance.last_chance_s)
     left, right = 0.8 * min([0.5, *known]), 1.2 * max([10.0, *known])
     bottom, top = 0.8 * min([0.2, *chance]), 1.2 * max([3.0, *chance])
     panels[1].fill_between([left, top], [left, top], top, color=_GREY, alpha=0.15, linewidth=0)
@@ -89,8 +83,7 @@ def draw_how(failures: Sequence[Failure]) -> Figure:
         ticks = [tick for tick in _TICKS if least <= tick <= most]
         axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
         axis.set_ticks([], minor=True)
-    panels[1].set_xlabel("sphere known before the contact (s)")
-    panels[1].set_ylabel("last chance before the contact (s)")
+    panels[1].set(xlabel="sphere known before the contact (s)", ylabel="last chance before the contact (s)")
     return _finished(figure, panels)
 
 
@@ -104,15 +97,13 @@ def draw_worlds(worlds: Sequence[tuple[str, Features, NDArray[np.bool_]]]) -> Fi
         line, column = np.minimum(features.beside_line, 3), np.minimum(features.beside_column, 2)
         for panel, values, kinds in zip(panels, (line, column, features.media), _KINDS, strict=True):
             _rates(panel, values, kinds, arrived, number, short_name(mission))
-    panels[0].set_ylabel("at the goal (%)")
-    panels[0].set_xticks(range(4), ["0", "1", "2", "3+"])
-    panels[0].set_xlabel(f"spheres within {BESIDE_LINE:g} m\nof the straight line")
-    panels[1].set_xticks(range(3), ["0", "1", "2+"])
+    panels[0].set(ylabel="at the goal (%)", xlabel=f"spheres within {BESIDE_LINE:g} m\nof the straight line")
     panels[1].set_xlabel(f"spheres in the zone within {BESIDE_COLUMN:g} m\nof the column at the water end")
-    panels[2].set_xticks(range(len(MEDIA)), [media.replace(" to ", "\nto ") for media in MEDIA])
     panels[2].set_xlabel("start and goal")
-    for panel, kinds in zip(panels, _KINDS, strict=True):
-        panel.set_xlim(-0.5, kinds - 0.5)
+    media = [name.replace(" to ", "\nto ") for name in MEDIA]
+    for panel, labels in zip(panels, (("0", "1", "2", "3+"), ("0", "1", "2+"), media), strict=True):
+        panel.set_xticks(range(len(labels)), labels)
+        panel.set_xlim(-0.5, len(labels) - 0.5)
         panel.grid(axis="y", alpha=0.3)
     panels[0].set_ylim(top=100.0 + 0.03 * (100.0 - panels[0].get_ylim()[0]))
     return _finished(figure, panels)
@@ -131,21 +122,11 @@ def _rates(
         return
     kind, rate, low, high = np.array(points).T
     shape, colour = _SERIES[number % len(_SERIES)]
-    panel.errorbar(
-        kind + 0.12 * (number - 1),
-        100.0 * rate,
-        100.0 * np.array([rate - low, high - rate]),
-        fmt=shape,
-        color=colour,
-        capsize=3,
-        label=label,
-    )
+    x, interval = kind + 0.12 * (number - 1), 100.0 * np.array([rate - low, high - rate])
+    panel.errorbar(x, 100.0 * rate, interval, fmt=shape, color=colour, capsize=3, label=label)
 
 
 def _panels(count: int, size: tuple[float, float], *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     with rc_context(style.FONTS):
         figure = Figure(figsize=size, dpi=style.DOTS_PER_INCH, layout="constrained")
         return figure, list(figure.subplots(1, count, sharey=sharey, squeeze=False)[0])
@@ -156,16 +137,12 @@ def _mark(panel: Axes, failures: Sequence[Failure], points: Sequence[tuple[float
     for cause, (shape, colour) in _MARKS.items():
         those = [point for failure, point in zip(failures, points, strict=True) if failure.cause == cause]
         if those:
-            x, y = zip(*those, strict=True)
-            panel.scatter(
-                x, y, s=34, marker=shape, color=colour, edgecolor="white", linewidth=0.4, label=cause, zorder=3
-            )
+            drawn: dict[str, Any] = {"s": 34, "edgecolor": "white", "linewidth": 0.4, "zorder": 3}
+            panel.scatter(*zip(*those, strict=True), marker=shape, color=colour, label=cause, **drawn)
 
 
 def _finished(figure: Figure, panels: Sequence[Axes]) -> Figure:
     """Put one legend below the panels, each label once; say so in panels that have nothing to show."""
-    from matplotlib import rc_context
-
     handles: dict[str, Any] = {}
     for panel in panels:
         shown, labels = panel.get_legend_handles_labels()

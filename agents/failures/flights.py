@@ -1,7 +1,7 @@
 """Failed flights once more, singly, with everything kept that tells why they failed."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium as gym
@@ -25,22 +25,20 @@ class FailedFlight:
     world: World  # of its environment
     flight: Flight  # the whole record, every tick
     known: NDArray[np.float64]  # (M,) s, first decision made knowing each of the world's spheres, inf for none
-    stoppable: NDArray[np.bool_] | None  # (K,) whether a safe stop could still be chosen; None for a time-out
+    stoppable: NDArray[np.bool_]  # (K,) whether a safe stop could still be chosen; all False for a time-out
     period: float  # s between decisions
 
 
-class DecisionRecorder:
+@dataclass(frozen=True)
+class _Recorder:
     """Wraps a policy for one flight and keeps what it saw and chose; actions and memory stay as they are."""
 
-    def __init__(self, policy: Policy) -> None:
-        """Begin without decisions."""
-        self.policy = policy
-        self.seen: list[tuple[Mapping[str, NDArray], NDArray]] = []  # observation and action, a decision each
+    policy: Policy
+    seen: list[tuple[Mapping[str, NDArray], NDArray]] = field(default_factory=list)  # observation and action
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> Any:
-        """Return what the policy returns, and keep the decision."""
         action, memory = self.policy.predict(observation, state, episode_start, deterministic)
         self.seen.append((observation, action))
         return action, memory
@@ -54,7 +52,7 @@ def fly_failed(
     `mission` and `seed` say where the world is from; `outcome` is the name of that in the batch. Raises ValueError if
     the flight ends otherwise now, because the policy chooses differently alone than in a batch.
     """
-    recorder = DecisionRecorder(policy)
+    recorder = _Recorder(policy)
     flight = fly(env, recorder, scenario=scenario)
     if flight.outcome.name != outcome:
         raise ValueError(
@@ -66,24 +64,18 @@ def fly_failed(
     for decision, (observation, _) in enumerate(recorder.seen):
         for sphere in observation["obstacles"].tolist():
             since.setdefault(tuple(sphere), decision * period)
-    stoppable = _stoppable(recorder, Shield.for_env(policy, env))
+    # A safe stop can be chosen where the shield's check accepts the reference chosen, or one it would replace it by:
+    # hovering counts, and a retreat under water. An undetected sphere, which no one could know then, does not hinder.
+    observations, actions = zip(*recorder.seen, strict=True)
+    batch = {key: np.stack([seen[key] for seen in observations]) for key in observations[0]}
+    shield = Shield.for_env(policy, env)
+    stoppable = shield.check(batch, np.array(actions, np.float64), batch["reference"])[2] != HELD
     return FailedFlight(
         mission=mission,
         seed=seed,
         world=env.get_wrapper_attr("world"),
         flight=flight,
         known=np.array([since.get(tuple(sphere), np.inf) for sphere in flight.scenario.obstacles.tolist()]),
-        stoppable=None if flight.outcome is Outcome.TIMEOUT else stoppable,
+        stoppable=stoppable & (flight.outcome is not Outcome.TIMEOUT),
         period=period,
     )
-
-
-def _stoppable(recorder: DecisionRecorder, shield: Shield) -> NDArray[np.bool_]:
-    """Return for each decision whether the shield's check accepts the reference chosen, or one it would replace it by.
-
-    Hovering where the vehicle is counts, and a retreat under water. What no one could know then, an undetected sphere,
-    does not hinder it.
-    """
-    observations, actions = zip(*recorder.seen, strict=True)
-    batch = {key: np.stack([seen[key] for seen in observations]) for key in observations[0]}
-    return shield.check(batch, np.array(actions, np.float64), batch["reference"])[2] != HELD

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hydrone_gym.world.bodies import gaps_along
 from hydrone_gym.world.scenario import Scenario
@@ -38,10 +38,3 @@ def features_of(scenarios: Iterable[Scenario], reach: float) -> Features:
         near = np.sum(gaps_along(start, goal, spheres) <= BESIDE_LINE)
         rows.append((near, np.sum(beside & in_way) if media >= 2 else -1, media))
     return Features(*np.array(rows, np.int64).reshape(-1, 3).T)
-
-
-def share_of_way(points: NDArray[np.float64], start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:
-    """Return how far along the line from start to goal points (n, 3) in m lie: 0 at the start, 1 at the goal."""
-    origin = np.asarray(start, np.float64)
-    way = np.asarray(goal, np.float64) - origin
-    return (points - origin) @ way / (way @ way)

@@ -9,8 +9,7 @@ import minari
 import numpy as np
 import pytest
 
-from agents.demonstration_files import find_datasets, load_demonstrations
-from agents.demonstrations import Recording, demonstrate, record
+from agents.demonstrations import Recording, demonstrate, find_datasets, load_demonstrations, record
 from hydrone_gym.cli import main
 from hydrone_gym.evaluation import HELD_OUT
 from hydrone_gym.evaluation.policies import find_policy

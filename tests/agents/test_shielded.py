@@ -4,8 +4,7 @@ import gymnasium as gym
 import numpy as np
 
 from agents.recipe import load_recipe
-from agents.shielded import INTERVENTION, ShieldedVecEnv
-from agents.vec_env import HydroneVecEnv
+from agents.vec_env import INTERVENTION, HydroneVecEnv
 from hydrone_gym import Outcome
 from hydrone_gym.evaluation import MISSIONS
 from hydrone_gym.perception.egocentric import Egocentric
@@ -28,7 +27,7 @@ class Relative:
 
 def test_a_shielded_row_flies_as_a_shielded_policy():
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 4, 3)).astype(np.float32)
-    rows = ShieldedVecEnv(ID, 4)
+    rows = HydroneVecEnv(ID, 4, shield=True)
     rows.seed(20)
     rows.reset()
     env = gym.make(ID)
@@ -38,7 +37,7 @@ def test_a_shielded_row_flies_as_a_shielded_policy():
         _, rewards, done, _ = rows.step(actions[k])
         action, state = shield.predict(observation, state)
         observation, reward, terminated, truncated, _ = env.step(action)
-        assert rows.shielded.choice[2] == state.choice[0]
+        assert rows.shields[0].choice[2] == state.choice[0]
         assert rewards[2] == np.float32(np.float32(reward) + np.float32(INTERVENTION * (state.choice[0] != 0)))
         intervened += state.choice[0] != 0
         assert done[2] == (terminated or truncated)
@@ -49,8 +48,8 @@ def test_a_shielded_row_flies_as_a_shielded_policy():
 
 
 def test_random_actions_are_kept_safe_where_they_are_not_without():
-    def failures(kind):
-        rows, rng, found = kind(ID, 32), np.random.default_rng(0), []
+    def failures(shield):
+        rows, rng, found = HydroneVecEnv(ID, 32, shield=shield), np.random.default_rng(0), []
         rows.seed(5)
         rows.reset()
         for _ in range(120):
@@ -58,8 +57,8 @@ def test_random_actions_are_kept_safe_where_they_are_not_without():
             found += [info["outcome"] for info in infos if info and info["outcome"] not in (1, 5)]
         return found
 
-    assert Outcome.COLLISION in failures(HydroneVecEnv)
-    assert failures(ShieldedVecEnv) == []
+    assert Outcome.COLLISION in failures(False)
+    assert failures(True) == []
 
 
 def test_the_packaged_recipes():

@@ -15,10 +15,10 @@ from agents import run_log, training
 from agents.agent_file import read_agent
 from agents.algorithms import ALGORITHMS
 from agents.checkpoint import checkpoints, load_buffer, save_buffer
-from agents.mission_mix import MissionMix
 from agents.recipe import ENV_ID, FOLDER, load_recipe
 from agents.run_log import RunLog
 from agents.training import TrainingRun, resume, train
+from agents.vec_env import MissionMix
 from hydrone_gym.evaluation import HELD_OUT, MISSIONS
 
 SMALL = {
@@ -192,7 +192,7 @@ def test_the_recipe_says_what_the_rows_fly_in(tmp_path, monkeypatch):
     recipe = written(tmp_path / "dense.yml", {**SMALL, "environment": {"num_obstacles": 7, "time_limit": 30.0}})
     for name, options in (("a", {}), ("b", {"num_obstacles": 9})):
         train(small_run(tmp_path / name, recipe, steps=PERIOD, options=options, evaluation_episodes=2))
-    rows = [part.env.options for mix in made for part in mix.parts]
+    rows = [part.options for mix in made for part in mix.parts]
     assert [(o.num_obstacles, o.time_limit) for o in rows] == [(7, 30.0)] * 2 + [(9, 30.0)] * 2
     assert flown == [{}, {"num_obstacles": 9}]
 
@@ -265,7 +265,7 @@ def test_mission_mix_is_its_parts():
     mix = MissionMix({ENV_ID: 3, "HydroneGym/WaterToAir-v0": 2})
     mix.seed(7)
     observation = mix.reset()
-    second = mix.parts[1].env
+    second = mix.parts[1]
     goals = second._core.episodes.rows["goal"]
     np.testing.assert_array_equal(goals, [[-9.0, 9.0, 7.0]] * 2)
     alone = MissionMix({"HydroneGym/WaterToAir-v0": 2})
@@ -284,4 +284,4 @@ def test_mission_mix_is_its_parts():
 def test_held_out_seeds_lie_beyond_training():
     largest = HELD_OUT // 2 - 1
     TrainingRun(folder=Path("x"), seed=largest)
-    assert largest + load_recipe("ppo").rows < HELD_OUT
+    assert largest + sum(load_recipe("ppo").missions.values()) < HELD_OUT

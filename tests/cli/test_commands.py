@@ -8,7 +8,7 @@ import pytest
 
 from hydrone_gym.cli import main
 
-NAMES = ("clone", "demonstrate", "evaluate", "failures", "fly", "replay", "train")
+NAMES = ("demonstrate", "evaluate", "failures", "fly", "replay", "train")
 
 
 @pytest.fixture
