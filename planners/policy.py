@@ -61,7 +61,7 @@ class PlannerPolicy:
 
     def __init__(self, belief: Belief | Any = None) -> None:
         """Keep what to believe, a `Belief` or any model with vehicle, world and period; None for planners without."""
-        self.belief = None if belief is None else Belief.of(belief)
+        self.belief: Any = None if belief is None else Belief.of(belief)
 
     @classmethod
     def for_env(cls, env: Any, *, belief: Belief | Literal["truth"] | None = None, **options: Any) -> Self:

@@ -213,8 +213,8 @@ def log_crossings(b, lanes):
 
 
 @inlined
-def advance(b, lanes, obstacles, closest, count, model, first, last, ticks):
-    """Advance all lanes through ticks [first, last) of a period of `ticks` ticks.
+def advance(b, lanes, obstacles, closest, count, model, part):
+    """Advance all lanes through a part of a period.
 
     Args:
         b: a block from `new_block`; rows and the moves of their references already loaded.
@@ -223,8 +223,9 @@ def advance(b, lanes, obstacles, closest, count, model, first, last, ticks):
         closest: (count * lanes), least distance so far from each obstacle's surface, m; updated.
         count: number of obstacles.
         model: `Model`.
-        first, last, ticks: which part of the period.
+        part: (first, last, ticks): ticks [first, last) of a period of `ticks` ticks.
     """
+    first, last, ticks = part
     inverse_substeps = 1.0 / (ticks * SUBSTEPS)
     inverse_period = 1.0 / (ticks * TICK)
     # all lanes; were it a constant to LLVM, it would unroll the short loops to scalars before it could vectorise them
@@ -255,7 +256,7 @@ def compiled(law: str, lanes: int) -> Any:
     gains = named_law(law).gains
 
     def unit_of_law(block, obstacles, closest, values, count, first, last, ticks):
-        advance(block, lanes, obstacles, closest, count, model_of(values, gains), first, last, ticks)
+        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks))
 
     numbers, whole = types.CPointer(types.float64), types.int64
     signature = types.void(numbers, numbers, numbers, numbers, whole, whole, whole, whole)
