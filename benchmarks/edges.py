@@ -9,38 +9,58 @@ from benchmarks.c_reference.build import CReference, compiler
 from benchmarks.flying import flying_rows, lane_major, near_references, simulation, spheres_out_of_the_way
 from benchmarks.timing import Contestant
 from hydrone_gym._jit import kernel
+from planners import CLRRT
 from planners.cl_rrt.edge import BLOCKED, edge
-from planners.cl_rrt.tree import BACKUP, new_nodes, new_workspace
+from planners.cl_rrt.execute import Query, planner_of
+from planners.cl_rrt.tree import BACKUP, Workspace, new_nodes
 
 COUNT = 256
 MARGIN = 0.12  # m
 
 
 @kernel
-def propagate_edges(work, values, goal, references, margin, ticks):
+def propagate_edges(work, query, constants, references):
     """Propagate an edge from every node, as `expand_tree` does; return how many were free."""
-    free = 0
+    p, free = planner_of(work, query, constants), 0
     slot = references.shape[0]
     for k in range(references.shape[0]):
         r = references[k]
-        kind, _ = edge(work, values, goal, k, slot, r[0], r[1], r[2], r[3], margin, ticks)
+        kind, _ = edge(p, k, slot, (r[0], r[1], r[2], r[3]), MARGIN)
         if kind != BLOCKED:
             free += 1
     return free
 
 
+def edge_query(start: np.ndarray, goal: np.ndarray) -> Query:
+    """What edges are asked for: a vessel (21,) that tells the margin there is, and the goal (3,) in m."""
+    return Query(
+        start=start,
+        goal=goal,
+        eye=start[:3],
+        draws=np.zeros(0),
+        size=1,
+        root=-1,
+        known_before=0,
+        held=start[-4:],
+        holds=False,
+        roam=0,
+        iterations=0,
+        begin=True,
+        finish=False,
+    )
+
+
 def _planner_edges(rows: np.ndarray, references: np.ndarray, spheres: np.ndarray) -> Contestant:
     """Edges as CL-RRT propagates them: node to node, one at a time."""
-    nodes = new_nodes(COUNT)
+    nodes, planner = new_nodes(COUNT), CLRRT(simulation(1))
     for field in ("state", "integral", "reference"):
         nodes[field][:COUNT] = rows[field]
-    work = new_workspace(nodes, spheres[0], np.zeros((BACKUP, 4)))
-    goal = np.full(3, 100.0)
-    ours = simulation(1)
+    work = Workspace.around(nodes, np.zeros((BACKUP, 4)), planner.simulation, spheres[0])
+    start = np.concatenate([rows["state"][0], rows["integral"][0], [0.0], rows["reference"][0]])
+    query = edge_query(start, np.full(3, 100.0))
 
     def run() -> float:
-        work.closest[:] = np.inf
-        propagate_edges(work, ours.values, goal, references, MARGIN, ours.ticks)
+        propagate_edges(work, query, planner._constants, references)
         return COUNT
 
     return Contestant("CL-RRT, one at a time", run)

@@ -25,17 +25,16 @@ from benchmarks.planning import DENSITIES, SETS, law_of
 from benchmarks.tables import Sheet, number
 from benchmarks.timing import save
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import VESSEL
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.generator import generate
 from hydrone_gym.world.scenario import Scenario
 from hydrone_gym.world.world import World
-from planners.cl_rrt.execute import cycle
+from planners import CLRRT
+from planners.cl_rrt.execute import Query, cycle
 from planners.cl_rrt.expand import DRAWS
 from planners.cl_rrt.memory import first_memory
-from planners.cl_rrt.objective import objective_params
-from planners.cl_rrt.settings import CLRRTSettings
-from planners.cl_rrt.stopping import safe_speed
-from planners.cl_rrt.tree import new_workspace
+from planners.cl_rrt.tree import Workspace
 
 PERIOD = 0.5  # s
 SAMPLES = 4  # between looks at the tree
@@ -70,10 +69,7 @@ class Grower:
 
     def __init__(self, a: Settings) -> None:
         """Make the planner's parameters."""
-        self._simulation = Simulation(named_vehicle(a.vehicle), World(), PERIOD)
-        self._settings = CLRRTSettings()
-        self._params = self._settings.params(safe_speed(self._simulation, 1) * PERIOD, prune=a.objective != "paper")
-        self._objective = objective_params(self._simulation, a.objective)
+        self._planner = CLRRT(Simulation(named_vehicle(a.vehicle), World(), PERIOD), objective=a.objective)
         self._limit = a.limit
 
     def plan(self, row: np.ndarray, scenario: Scenario, seed: int) -> Planned:
@@ -81,40 +77,39 @@ class Grower:
         obstacles, goal = np.array(scenario.obstacles), np.array(scenario.goal)
         wall, cpu = time.perf_counter(), time.process_time()
         random = np.random.Generator(np.random.Philox(key=seed))
-        memory = first_memory(self._settings.max_nodes, row[16:])
-        work = new_workspace(memory.nodes, obstacles, memory.backup)
+        planner, most = self._planner, self._planner.settings.max_nodes
+        memory = first_memory(most, row[-4:])
+        work = Workspace.around(memory.nodes, memory.backup, planner.simulation, obstacles)
         ends, dead = work.nodes["goal"], work.nodes["dead"]
         size, root, begin, solved = 0, -1, True, False
         while not solved and time.perf_counter() - wall < self._limit:
             before = 0 if begin else size
-            size = cycle(
-                work,
-                self._simulation.values,
-                goal,
-                row,
-                row[:3],
-                size,
-                root,
-                len(obstacles),
-                random.random(SAMPLES * DRAWS),
-                SAMPLES,
-                self._params,
-                self._objective,
-                0,
-                self._simulation.ticks,
-                begin,
-                False,
-            )[0]
-            root, begin = 0, size > FULL * self._settings.max_nodes
+            query = Query(
+                start=row,
+                goal=goal,
+                eye=row[:3],
+                draws=random.random(SAMPLES * DRAWS),
+                size=size,
+                root=root,
+                known_before=len(obstacles),
+                held=row[-4:],
+                holds=False,
+                roam=0,
+                iterations=SAMPLES,
+                begin=begin,
+                finish=False,
+            )
+            size = cycle(work, query, planner._constants)[0]
+            root, begin = 0, size > FULL * most
             solved = bool((ends[before:size] > dead[before:size]).any())
         return Planned(solved, time.perf_counter() - wall, time.process_time() - cpu, int(work.edges[0]))
 
 
 def start_row(scenario: Scenario) -> np.ndarray:
-    """A vehicle at rest: state, controller memory, reference, (20,)."""
+    """A vessel at rest: state, controller memory, energy, reference, (21,)."""
     x, y, z, yaw = scenario.start
-    row = np.zeros(20)
-    row[:3], row[5], row[16:] = (x, y, z), yaw, (x, y, z, yaw)
+    row = np.zeros(VESSEL)
+    row[:3], row[5], row[-4:] = (x, y, z), yaw, (x, y, z, yaw)
     return row
 
 

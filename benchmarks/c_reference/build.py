@@ -9,15 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from hydrone_gym.control.air import AirGainParams
+from hydrone_gym.control.paper import AirGainParams, WaterGainParams
 from hydrone_gym.control.reference import Integral
-from hydrone_gym.control.water import WaterGainParams
 from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.parameters import MediumParams, VehicleParams
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.storage import LOGGED_CROSSINGS, ROW, new_block
+from hydrone_gym.simulation.storage import LOGGED_CROSSINGS, ROW
 from hydrone_gym.world.world import WorldParams
 
+_STATE, _INTEGRAL = State._fields, tuple(f"integral_{name}" for name in Integral._fields)
+# What a lane of the C kernel holds, by the names that tick.h uses.
+BLOCK = (
+    *_STATE,
+    *_INTEGRAL,
+    *("old_x", "old_y", "old_z", "old_psi", "move_x", "move_y", "move_z", "move_psi"),
+    *("goal_x", "goal_y", "goal_z", "ticks", "energy", "clearance", "outcome", "crossings"),
+    *("crossed", "cross_direction", "cross_speed2", "cross_cos", "cross_vz", "inverse_length2"),
+    *(f"saved_{name}" for name in (*_STATE, *_INTEGRAL, "energy")),
+)
 HERE = Path(__file__).resolve().parent
 # Strict: no fused multiply-add and no reordering. The last two give no other result, they only say that nobody looks
 # at floating-point exceptions and errno afterwards; without them no root and no branch can be vectorised.
@@ -42,9 +51,8 @@ def _list(name: str, fields: tuple[str, ...]) -> str:
 
 def _row_moves() -> list[str]:
     """Macros that move what a row and a lane share, named by the row's fields."""
-    integral = tuple(f"integral_{name}" for name in Integral._fields)
-    pairs = [(name, f"state[{k}]") for k, name in enumerate(State._fields)]
-    pairs += [(name, f"integral[{k}]") for k, name in enumerate(integral)]
+    pairs = [(name, f"state[{k}]") for k, name in enumerate(_STATE)]
+    pairs += [(name, f"integral[{k}]") for k, name in enumerate(_INTEGRAL)]
     pairs += [(name, name) for name in ("ticks", "energy", "clearance", "outcome", "crossings")]
     goal = [(f"goal_{axis}", f"goal[{k}]") for k, axis in enumerate("xyz")]
     load = " ".join(f"b->{lane}[i] = row->{field};" for lane, field in pairs + goal)
@@ -59,9 +67,8 @@ def layout() -> str:
     for name in ROW.names or ():
         sizes = "".join(f"[{size}]" for size in ROW[name].shape)
         row.append(f"double {name}{sizes};")
-    fields = new_block(1).dtype.names or ()
-    block = " ".join(f"double {name}[LANES];" for name in fields)
-    saved = tuple(name.removeprefix("saved_") for name in fields if name.startswith("saved_"))
+    block = " ".join(f"double {name}[LANES];" for name in BLOCK)
+    saved = tuple(name.removeprefix("saved_") for name in BLOCK if name.startswith("saved_"))
     return "\n".join(
         [
             _struct("Medium", MediumParams._fields),
@@ -96,7 +103,7 @@ class CReference:
         if result.returncode:
             raise RuntimeError(f"the C reference does not compile:\n{result.stderr}")
         self.lanes, self.values, self.ticks, self.library = lanes, values, ticks, library
-        self._block = new_block(lanes)
+        self._block = np.zeros((len(BLOCK), lanes))
         self._log = np.zeros((lanes, LOGGED_CROSSINGS, 5))
         self._function: Any = ctypes.CDLL(str(library)).advance_rows
         self._function.restype = None

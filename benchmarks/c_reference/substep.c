@@ -16,7 +16,7 @@
 #define PI 3.141592653589793
 #define INLINE static inline __attribute__((always_inline))
 
-typedef struct { Vehicle vehicle; AirGains air; WaterGains water; World world; } Model;
+typedef struct { Vehicle vehicle; World world; AirGains air; WaterGains water; } Model;
 typedef struct { double s_phi, c_phi, s_theta, c_theta, s_psi, c_psi; } Attitude;
 typedef struct { double x, y, z; } Vector;
 typedef struct { double x, y, z, psi, vx, vy, vz; } Reference;

@@ -109,7 +109,7 @@ static void log_crossings(Block *b, double *log)
                 entry[0] = b->ticks[i] * TICK;
                 entry[1] = b->cross_direction[i];
                 entry[2] = sqrt(b->cross_speed2[i]);
-                entry[3] = acos(b->cross_cos[i] < 1.0 ? b->cross_cos[i] : 1.0);
+                entry[3] = b->cross_cos[i] < 1.0 ? b->cross_cos[i] : 1.0;
                 entry[4] = b->cross_vz[i];
             }
             b->crossings[i] += 1.0;

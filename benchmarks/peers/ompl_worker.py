@@ -18,16 +18,17 @@ from typing import Any
 import numpy as np
 from ompl import base, control, util
 
-from benchmarks.edges import propagate_edges
+from benchmarks.edges import edge_query, propagate_edges
 from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.storage import VESSEL
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.world import World
-from planners.cl_rrt.settings import CLRRTSettings
-from planners.cl_rrt.tree import BACKUP, new_nodes, new_workspace
+from planners import CLRRT
+from planners.cl_rrt.tree import BACKUP, Workspace, new_nodes
 
 # An OMPL state is compound: the position, which alone makes distances, and everything else of an edge's end.
 POSITION = 3
-REST = 9 + 4 + 4 + 1  # the other states, controller memory, reference in force, 1 if the edge was free
+REST = 9 + 4 + 1 + 4 + 1  # the other states, controller memory, energy, reference in force, 1 if the edge was free
 WIDE = 1e4  # bounds of what is not sampled for a purpose
 STEP = (1.0, 1.0, 1.0, 0.5)  # a control: how far a period moves the reference from the vehicle at most, m, m, m, rad
 
@@ -58,14 +59,14 @@ class Edges:
     """The state propagator: CL-RRT's edge over one period, in one world."""
 
     def __init__(self, simulation: Simulation, goal: list[float], obstacles: list[list[float]]) -> None:
-        self._simulation, self._goal = simulation, np.array(goal)
-        nodes = new_nodes(2)
-        self._work = new_workspace(nodes, np.array(obstacles).reshape(-1, 4), np.zeros((BACKUP, 4)))
-        # fields lie one after another: 12 states, 4 of controller memory, 4 of reference
+        planner, nodes = CLRRT(simulation), new_nodes(1)
+        spheres = np.array(obstacles).reshape(-1, 4)
+        self._work = Workspace.around(nodes, np.zeros((BACKUP, 4)), planner.simulation, spheres)
+        # a node begins with a vessel: 12 states, 4 of controller memory, energy, 4 of reference
         numbers = nodes.view(np.float64).reshape(len(nodes), -1)
-        self._start, self._end = numbers[0, :20], numbers[1, :20]
+        self._start, self._end = numbers[0, :VESSEL], numbers[1, :VESSEL]
         self._reference = np.zeros((1, 4))
-        self._margin = CLRRTSettings().margin
+        self._query, self._constants = edge_query(self._start, np.array(goal)), planner._constants
         self.count = 0
 
     def propagate(self, state: Any, move: Any, duration: float, result: Any) -> None:
@@ -74,10 +75,8 @@ class Edges:
         x, y, z = state[0][0:POSITION]
         rest = state[1][0 : REST - 1]
         self._start[:] = [x, y, z, *rest]
-        self._reference[0] = [x + move[0], y + move[1], z + move[2], rest[16] + move[3]]
-        free = propagate_edges(
-            self._work, self._simulation.values, self._goal, self._reference, self._margin, self._simulation.ticks
-        )
+        self._reference[0] = [x + move[0], y + move[1], z + move[2], rest[-1] + move[3]]
+        free = propagate_edges(self._work, self._query, self._constants, self._reference)
         end = self._end.tolist()
         result[0][0:POSITION] = end[:POSITION]
         result[1][0:REST] = [*end[POSITION:], float(free)]
