@@ -125,12 +125,13 @@ def hover_reference(check, vessel):
 
 @routine
 def follow(check, start, end, reference):
-    """Fly a vessel toward a reference for one period; return (whether that is safe, whether it arrives)."""
+    """Fly a vessel toward a reference for one period; return (whether that is safe, arrives, passes the surface)."""
     flown = propagate(check.lane, start, end, check.goal, reference)
     smooth = flown.lateral_speed <= check.world.rough_speed and flown.cos_tilt >= check.world.rough_cos_tilt
     arrives = flown.outcome == GOAL
     on = flown.outcome == RUNNING or arrives
-    return on and flown.clearance >= check.margin and smooth and sensed(check, end), arrives
+    safe = on and flown.clearance >= check.margin and smooth and sensed(check, end)
+    return safe, arrives, flown.crossings > 0.0
 
 
 @inlined
@@ -144,12 +145,15 @@ def _resting(check, s, hover):
 
 @routine
 def rests(check, vessel, hover, seconds):
-    """Whether a vessel comes to rest safely at a hover within some time; it is flown in place."""
-    resting = False
+    """Whether a vessel comes to rest safely at a hover within some time; it is flown in place.
+
+    It passes the surface only if the hover lies on the other side.
+    """
+    resting, stays = False, is_air(state_of(vessel).z) == is_air(hover[2])
     for _ in range(int(np.ceil(seconds / check.period))):
-        safe, arrives = follow(check, vessel, vessel, hover)
-        if arrives or not safe:
-            return safe
+        safe, arrives, crosses = follow(check, vessel, vessel, hover)
+        if arrives or not safe or (crosses and stays):
+            return safe and not (crosses and stays)
         resting = _resting(check, state_of(vessel), hover)
         if resting:
             break
@@ -163,17 +167,24 @@ def rests(check, vessel, hover, seconds):
 
 
 @routine
-def can_stop(check, vessel):
-    """Return (whether a vessel can hover to rest, the hover that does it); the vessel is left as it is.
-
-    Near the surface there are two ways to stop: go back to the side one is on, or finish the crossing.
-    """
+def can_hover(check, vessel):
+    """Return (whether a vessel can hover to rest on its side of the surface, the hover); the vessel stays as it is."""
     spare, hover = shifted(check.scratch, VESSEL), hover_reference(check, vessel)
     copy_vessel(vessel, spare)
-    if rests(check, spare, hover, LOOK_AHEAD):
-        return True, hover
-    if abs(state_of(vessel).z) > AIR_GATE:
-        return False, hover
+    return rests(check, spare, hover, LOOK_AHEAD), hover
+
+
+@routine
+def can_stop(check, vessel):
+    """Return (whether a vessel can come to rest, the hover that does it); the vessel is left as it is.
+
+    Near the surface there are two ways to stop: go back to the side one is on, or finish the crossing. The second one
+    is for those who have no plan of crossings: a planner that counted on it would enter the zone anywhere.
+    """
+    spare = shifted(check.scratch, VESSEL)
+    stops, hover = can_hover(check, vessel)
+    if stops or abs(state_of(vessel).z) > AIR_GATE:
+        return stops, hover
     hover = single(hover[0], hover[1], -WATER_GATE if is_air(hover[2]) else AIR_GATE, hover[3])
     copy_vessel(vessel, spare)
     return rests(check, spare, hover, LOOK_AHEAD), hover
@@ -183,7 +194,7 @@ def can_stop(check, vessel):
 def verify(check, vessel, reference):
     """Return (whether a reference can be followed to rest, the hover that does it); the vessel is left as it is."""
     end = check.scratch
-    safe, arrives = follow(check, vessel, end, reference)
+    safe, arrives, _ = follow(check, vessel, end, reference)
     if arrives or not safe:
         return safe, hover_reference(check, end)
     return can_stop(check, end)
@@ -220,4 +231,4 @@ def goes_on(check, vessel, held):
     return HELD, held
 
 
-__all__ = ["HELD", "RETREAT", "Check", "can_stop", "follow", "goes_on", "rests", "verify"]
+__all__ = ["HELD", "RETREAT", "Check", "can_hover", "can_stop", "follow", "goes_on", "rests", "verify"]

@@ -23,7 +23,7 @@ from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, ROOT, Planner, node_sta
 from planners.clearance import clearance_between
 from planners.stop_check import (
     Check,
-    can_stop,
+    can_hover,
     copy_vessel,
     follow,
     goes_on,
@@ -181,12 +181,12 @@ def verify_stop(p, first):
     while p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
         reference = reference_of(pointer(p.nodes[node]))
-        safe, _ = follow(p.check, end, end, reference)
+        safe, _, _ = follow(p.check, end, end, reference)
         if not safe or count >= BACKUP - 1:
             return 0
         back_up(p, count, reference)
         count += 1
-    safe, hover = can_stop(p.check, end)
+    safe, hover = can_hover(p.check, end)
     back_up(p, count, hover)
     return count + 1 if safe else 0
 
