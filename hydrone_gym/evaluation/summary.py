@@ -66,7 +66,7 @@ class MissionSummary:
 
 
 def summarise(records: Sequence[Record], baseline: str | None = None) -> list[MissionSummary]:
-    """Sum up an evaluation, finished or not: for each suite its missions, then all of them together if they are several.
+    """Sum up an evaluation, finished or not: for each suite its missions, then all of them together if there are more.
 
     The `baseline` is `BASELINE` unless given, if it flew, else the first policy; ValueError for one that did not fly.
     """

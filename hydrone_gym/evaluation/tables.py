@@ -53,7 +53,8 @@ def _measures(p: PolicySummary) -> tuple[str, ...]:
 
 def _difference(c: Comparison) -> tuple[str, ...]:
     worlds = (f"{c.only_policy} / {c.only_baseline}", f"{c.p_value:.2g}", str(c.both))
-    return (c.policy, _cell(c.success, 1, 100.0, "+"), *worlds, _cell(c.time, 2, 1.0, "+"), _cell(c.energy, 0, 1.0, "+"))
+    success, time, energy = _cell(c.success, 1, 100.0, "+"), _cell(c.time, 2, 1.0, "+"), _cell(c.energy, 0, 1.0, "+")
+    return (c.policy, success, *worlds, time, energy)
 
 
 def _cell(value: Estimate | float | None, digits: int, scale: float = 1.0, sign: str = "") -> str:
