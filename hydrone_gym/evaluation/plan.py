@@ -178,8 +178,7 @@ def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:
     _warm_up(job, env)
     try:
         if job.batch:
-            vector = {"num_envs": len(scenarios), "vectorization_mode": "vector_entry_point"}
-            rows = gym.make_vec(job.env_id, **vector, **job.options)
+            rows = gym.make_vec(job.env_id, len(scenarios), "vector_entry_point", **job.options)
             endings = fly_worlds(rows, job.policy.make(env, job.seed), scenarios=scenarios)
             return list(map(record_of, job.keys, endings)), None
         for key, scenario in zip(job.keys, scenarios, strict=True):

@@ -32,7 +32,8 @@ class PairedSuccess(NamedTuple):
 
 def percentiles(values: ArrayLike, shares: Sequence[float]) -> list[float | None]:
     """Return percentiles of values at shares in percent, interpolated linearly; None for each if there is no value."""
-    return np.percentile(values, shares).tolist() if np.size(values) else [None] * len(shares)
+    numbers = np.asarray(values, dtype=np.float64)
+    return np.percentile(numbers, shares).tolist() if numbers.size else [None] * len(shares)
 
 
 def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
