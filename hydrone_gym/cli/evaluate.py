@@ -80,22 +80,23 @@ class Evaluate:
         records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
         seconds = time.perf_counter() - began
         document, tables = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
-        pages = [] if self.report is None else [self._report(plan, folder.folder, self.report)]
+        paths = [folder.folder / name for name in (ROWS, SUMMARY, TABLES)]
+        if self.report is not None:
+            writer = None if self.no_replays else _replay_writer()
+            paths.append(write_report(folder.folder, into=self.report, plan=plan, replay=writer))
         if self.json:
             print(json.dumps(document, indent=1, allow_nan=False))
-            return 0
-        print_tables(tables)
-        for path in [*(folder.folder / name for name in (ROWS, SUMMARY, TABLES)), *pages]:
-            print(path)
+        else:
+            print_tables(tables)
+            print(*paths, sep="\n")
         return 0
 
-    def _report(self, plan: Plan, folder: Path, target: Path) -> Path:
-        """Write the report, without replays where what writes them is not installed."""
-        writer: Writer | None = None
-        if not self.no_replays:
-            try:
-                load_viser()
-                writer = write_replay
-            except DependencyNotInstalled as error:
-                print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
-        return write_report(folder, into=target, plan=plan, replay=writer)
+
+def _replay_writer() -> Writer | None:
+    """Return what writes replays, None where that is not installed."""
+    try:
+        load_viser()
+    except DependencyNotInstalled as error:
+        print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
+        return None
+    return write_replay
