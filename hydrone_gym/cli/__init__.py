@@ -1,8 +1,8 @@
 """The command `hydrone`, whose subcommands are found by entry points of the group `hydrone_gym.commands`.
 
-A subcommand is a class whose fields are the options and whose `run` returns the exit code; the first line of its
-docstring is what `hydrone --help` shows, and an extra that it needs is its class variable `EXTRA`. Only the one asked
-for is imported.
+A subcommand is a class whose fields are the options, explained by the comment or docstring of each, and whose `run`
+returns the exit code; the first line of its docstring is what `hydrone --help` shows, and an extra that it needs is its
+class variable `EXTRA`. Only the one asked for is imported.
 
 Exit codes: 0 success; 1 a mission that did not end at the goal, or an evaluation that could not be finished; 2 bad
 input, told in one line; 130 an evaluation stopped by Ctrl-C.

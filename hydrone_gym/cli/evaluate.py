@@ -33,28 +33,19 @@ class Evaluate:
     """Frozen suites paper-20, dense-40, missions, density; held-out, flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
-    worlds: int = 100
-    """First so many worlds of each mission."""
-    seed: int = 0
-    """Seed for policies that draw; the worlds are those of the suite."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
-    baseline: str | None = None
-    """Policy that the others are compared with; clrrt if it is among them, else the first."""
-    jobs: int | None = None
-    """Flights at once, as many as there are cores unless given."""
-    backend: str = "loky"
-    """Backend of joblib: loky, threading, dask, ray."""
+    worlds: int = 100  # First so many worlds of each mission.
+    seed: int = 0  # Seed for policies that draw; the worlds are those of the suite.
+    vehicle: Literal["paper", "physical"] = "paper"  # Parameter set of the vehicle.
+    baseline: str | None = None  # Policy that the others are compared with; clrrt if it is among them, else the first.
+    jobs: int | None = None  # Flights at once, as many as there are cores unless given.
+    backend: str = "loky"  # Backend of joblib: loky, threading, dask, ray.
     out: Path | None = None
     """Folder for rows.csv, summary.json and tables.md, evaluations/<suites> unless given; made if missing."""
     report: Path | None = None
     """Folder for report.html: tables, figures, and replays of the best, median and worst flight of each policy."""
-    no_replays: bool = False
-    """Leave the replays out of the report."""
-    overwrite: bool = False
-    """Begin anew in a folder that holds another evaluation."""
-    json: bool = False
-    """Print the summary as one JSON document instead of the tables, and show no progress bar."""
+    no_replays: bool = False  # Leave the replays out of the report.
+    overwrite: bool = False  # Begin anew in a folder that holds another evaluation.
+    json: bool = False  # Print the summary as one JSON document instead of the tables, and show no progress bar.
 
     def run(self) -> int:
         """Fly, report and return the exit code."""

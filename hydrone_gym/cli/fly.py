@@ -21,12 +21,9 @@ _TREE_ITERATIONS = 400  # samples of the tree figure
 class Fly(MissionOptions):
     """Fly the paper's experiments, print what happened and draw the figures."""
 
-    out: Path = Path("flights")
-    """Folder for figures and flight.json; made if missing."""
-    json: bool = False
-    """Print one JSON document instead of the table."""
-    no_figures: bool = False
-    """Draw no figures."""
+    out: Path = Path("flights")  # Folder for figures and flight.json; made if missing.
+    json: bool = False  # Print one JSON document instead of the table.
+    no_figures: bool = False  # Draw no figures.
 
     def run(self) -> int:
         """Fly, report and return the exit code."""

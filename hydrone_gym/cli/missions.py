@@ -29,22 +29,16 @@ class Prepared(NamedTuple):
 class MissionOptions:
     """What is flown."""
 
-    experiment: Literal[1, 2] | None = None
-    """1: air to water, 2: water to air; both unless given."""
-    seed: int = 0
-    """Seed of the random world and of the planner."""
-    obstacles: int | None = None
-    """Number of spheres, 20 unless given."""
+    experiment: Literal[1, 2] | None = None  # 1: air to water, 2: water to air; both unless given.
+    seed: int = 0  # Seed of the random world and of the planner.
+    obstacles: int | None = None  # Number of spheres, 20 unless given.
     policy: str = "clrrt"
     """Registered name such as clrrt or straight-line; module:attribute, file.py:attribute, or an agent's folder."""
-    iterations: int | None = None
-    """Samples the CL-RRT draws each cycle, the planner's own number unless given."""
+    iterations: int | None = None  # Samples the CL-RRT draws each cycle, the planner's own number unless given.
     time_budget: float | None = None
     """Seconds a CL-RRT cycle may take, instead of a number of samples; not reproducible."""
-    scenario: Path | None = None
-    """Fly this scenario file instead of an experiment."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
+    scenario: Path | None = None  # Fly this scenario file instead of an experiment.
+    vehicle: Literal["paper", "physical"] = "paper"  # Parameter set of the vehicle.
 
     def prepare(self) -> list[Prepared]:
         """Check the options and set up what they ask for; raises ValueError or OSError."""

@@ -46,20 +46,13 @@ class Replay(MissionOptions):
 
     saved: tyro.conf.Positional[Path | None] = None
     """A flight.json of `hydrone fly`, or the folder of an evaluation; without it, a fresh flight."""
-    flight: str | None = None
-    """Of a flight.json: only the flight of this name."""
-    suite: str | None = None
-    """Of an evaluation: the suite, if there are several."""
-    mission: str | None = None
-    """Of an evaluation: the mission, if there are several."""
-    world: int | None = None
-    """Of an evaluation: the number of the world; --policy is the name in its tables."""
-    out: Path = Path("replay.html")
-    """File to write, or folder for it; for several flights their names are appended."""
-    open: bool = False
-    """Open the page in the browser."""
-    json: bool = False
-    """Print one JSON document instead of the names of the files."""
+    flight: str | None = None  # Of a flight.json: only the flight of this name.
+    suite: str | None = None  # Of an evaluation: the suite, if there are several.
+    mission: str | None = None  # Of an evaluation: the mission, if there are several.
+    world: int | None = None  # Of an evaluation: the number of the world; --policy is the name in its tables.
+    out: Path = Path("replay.html")  # File to write, or folder for it; for several flights their names are appended.
+    open: bool = False  # Open the page in the browser.
+    json: bool = False  # Print one JSON document instead of the names of the files.
 
     def run(self) -> int:
         """Fly, write the pages and return the exit code."""

@@ -58,8 +58,4 @@ def machine() -> dict[str, Any]:
     except OSError:
         named = ""
     processor = named.strip("\t: ") or platform.processor() or platform.machine()
-    return {
-        "processor": processor,
-        "cores": joblib.cpu_count(),
-        "system": f"{platform.system()} {platform.machine()}",
-    }
+    return {"processor": processor, "cores": joblib.cpu_count(), "system": f"{platform.system()} {platform.machine()}"}
