@@ -82,14 +82,15 @@ def paired_success(first: ArrayLike, second: ArrayLike, confidence: float = 0.95
 
     n, both = one.size, int((one & two).sum())
     only_first, only_second = int((one & ~two).sum()), int((two & ~one).sum())
-    p1, p2 = (both + only_first) / n, (both + only_second) / n
-    low1, high1 = wilson_interval(both + only_first, n, confidence)
-    low2, high2 = wilson_interval(both + only_second, n, confidence)
-    margins = math.sqrt(p1 * (1.0 - p1) * p2 * (1.0 - p2))
-    covariance = both / n - p1 * p2
+    solved1, solved2 = both + only_first, both + only_second
+    p1, p2 = solved1 / n, solved2 / n
+    low1, high1 = wilson_interval(solved1, n, confidence)
+    low2, high2 = wilson_interval(solved2, n, confidence)
+    margins = math.prod((solved1, n - solved1, solved2, n - solved2))
+    covariance = float(n * both - solved1 * solved2)
     if covariance > 0.0:  # Newcombe's correction for continuity
-        covariance = max(covariance - 0.5 / n, 0.0)
-    phi = covariance / margins if margins else 0.0
+        covariance = max(covariance - n / 2.0, 0.0)
+    phi = covariance / math.sqrt(margins) if margins else 0.0
 
     def reach(a: float, b: float) -> float:
         return math.sqrt(max(a * a - 2.0 * phi * a * b + b * b, 0.0))
