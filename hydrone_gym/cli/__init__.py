@@ -1,13 +1,14 @@
 """The command `hydrone`, whose subcommands are found by entry points of the group `hydrone_gym.commands`.
 
-A subcommand is a class whose fields are the options and whose `run` returns the exit code; the first line of its
-docstring is what `hydrone --help` shows, and an extra that it needs is its class variable `EXTRA`. Only the one asked
-for is imported.
+A subcommand is a class whose fields are the options, explained by the comment or docstring of each, and whose `run`
+returns the exit code; the first line of its docstring is what `hydrone --help` shows, and an extra that it needs is its
+class variable `EXTRA`. Only the one asked for is imported.
 
 Exit codes: 0 success; 1 a mission that did not end at the goal, or an evaluation that could not be finished; 2 bad
 input, told in one line; 130 an evaluation stopped by Ctrl-C.
 """
 
+import functools
 import inspect
 import os
 import sys
@@ -18,7 +19,6 @@ from typing import Any
 
 from gymnasium.error import DependencyNotInstalled
 
-from hydrone_gym.cli.compiling import tell_compiling
 from hydrone_gym.evaluation.run import EvaluationStopped
 
 GROUP = "hydrone_gym.commands"
@@ -31,12 +31,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name)}
     if not given or given[0] not in commands:
         return _help(commands, given)
+    import tyro
+
     try:
         kind = commands[given[0]].load()
     except Exception as error:  # of somebody else's package
         return refused(f"{given[0]} cannot be loaded: {type(error).__name__}: {error}")
     try:
-        code = _parsed(kind, given).run()
+        command = tyro.cli(kind, args=given[1:], prog=f"hydrone {given[0]}", config=(tyro.conf.FlagCreatePairsOff,))
+        tell_compiling()
+        code = command.run()
         sys.stdout.flush()
     except BrokenPipeError:  # the reader, `head` say, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -51,6 +55,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+@functools.cache
+def tell_compiling() -> None:
+    """From now on say on stderr which kernel is being compiled; one that is loaded from the cache is not told."""
+    from numba.core import event
+
+    class Teller(event.Listener):
+        depth = 0  # kernels compile others that they are made of
+
+        def on_start(self, event: Any) -> None:
+            if self.depth == 0:
+                function = event.data["dispatcher"].py_func
+                name = f"{function.__module__}.{function.__name__}"
+                print(f"hydrone: compiling {name} (once after an install)", file=sys.stderr, flush=True)
+            self.depth += 1
+
+        def on_end(self, event: Any) -> None:
+            self.depth -= 1
+
+    event.register("numba:compile", Teller())
+
+
 def refused(reason: object, code: int = 2) -> int:
     """Tell in one line why a command ends, and return its exit code."""
     print("hydrone: error:", " ".join(str(reason).split()), file=sys.stderr)
@@ -63,15 +88,6 @@ def check_obstacles(count: int | None) -> None:
         raise ValueError(f"--obstacles must be at most {MOST_OBSTACLES}, got {count}")
 
 
-def _parsed(kind: Any, given: list[str]) -> Any:
-    """Return the command with the options given; SystemExit for --help and for what cannot be parsed."""
-    import tyro
-
-    command = tyro.cli(kind, args=given[1:], prog=f"hydrone {given[0]}", config=(tyro.conf.FlagCreatePairsOff,))
-    tell_compiling()
-    return command
-
-
 def _help(commands: dict[str, EntryPoint], given: list[str]) -> int:
     """Print what subcommands there are; raise SystemExit if one was asked for that is not among them."""
     usage = "usage: hydrone [-h] COMMAND …"
@@ -81,15 +97,10 @@ def _help(commands: dict[str, EntryPoint], given: list[str]) -> int:
         raise SystemExit(2)
     print(f"{usage}\n\nFly the HyDrone in air, through the water surface and below it.\n\ncommands:")
     for name, entry in commands.items():
-        lead = f"  {name:<14}"
-        print(textwrap.fill(_about(entry), 100, initial_indent=lead, subsequent_indent=" " * len(lead)))
+        try:
+            about = (inspect.getdoc(entry.load()) or "").partition("\n")[0]
+        except Exception as error:
+            about = f"cannot be loaded: {type(error).__name__}: {error}"
+        print(textwrap.fill(about, 100, initial_indent=f"  {name:<14}", subsequent_indent=" " * 16))
     print("\n`hydrone COMMAND --help` lists the options of a command.")
     return 0
-
-
-def _about(entry: EntryPoint) -> str:
-    """Return the first line of a command's docstring, or why it cannot be loaded."""
-    try:
-        return (inspect.getdoc(entry.load()) or "").partition("\n")[0]
-    except Exception as error:
-        return f"cannot be loaded: {type(error).__name__}: {error}"

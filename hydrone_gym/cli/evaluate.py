@@ -33,28 +33,19 @@ class Evaluate:
     """Frozen suites paper-20, dense-40, missions, density; held-out, flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
-    worlds: int = 100
-    """First so many worlds of each mission."""
-    seed: int = 0
-    """Seed for policies that draw; the worlds are those of the suite."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
-    baseline: str | None = None
-    """Policy that the others are compared with; clrrt if it is among them, else the first."""
-    jobs: int | None = None
-    """Flights at once, as many as there are cores unless given."""
-    backend: str = "loky"
-    """Backend of joblib: loky, threading, dask, ray."""
+    worlds: int = 100  # First so many worlds of each mission.
+    seed: int = 0  # Seed for policies that draw; the worlds are those of the suite.
+    vehicle: Literal["paper", "physical"] = "paper"  # Parameter set of the vehicle.
+    baseline: str | None = None  # Policy that the others are compared with; clrrt if it is among them, else the first.
+    jobs: int | None = None  # Flights at once, as many as there are cores unless given.
+    backend: str = "loky"  # Backend of joblib: loky, threading, dask, ray.
     out: Path | None = None
     """Folder for rows.csv, summary.json and tables.md, evaluations/<suites> unless given; made if missing."""
     report: Path | None = None
     """Folder for report.html: tables, figures, and replays of the best, median and worst flight of each policy."""
-    no_replays: bool = False
-    """Leave the replays out of the report."""
-    overwrite: bool = False
-    """Begin anew in a folder that holds another evaluation."""
-    json: bool = False
-    """Print the summary as one JSON document instead of the tables, and show no progress bar."""
+    no_replays: bool = False  # Leave the replays out of the report.
+    overwrite: bool = False  # Begin anew in a folder that holds another evaluation.
+    json: bool = False  # Print the summary as one JSON document instead of the tables, and show no progress bar.
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
@@ -80,22 +71,23 @@ class Evaluate:
         records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
         seconds = time.perf_counter() - began
         document, tables = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
-        pages = [] if self.report is None else [self._report(plan, folder.folder, self.report)]
+        paths = [folder.folder / name for name in (ROWS, SUMMARY, TABLES)]
+        if self.report is not None:
+            writer = None if self.no_replays else _replay_writer()
+            paths.append(write_report(folder.folder, into=self.report, plan=plan, replay=writer))
         if self.json:
             print(json.dumps(document, indent=1, allow_nan=False))
-            return 0
-        print_tables(tables)
-        for path in [*(folder.folder / name for name in (ROWS, SUMMARY, TABLES)), *pages]:
-            print(path)
+        else:
+            print_tables(tables)
+            print(*paths, sep="\n")
         return 0
 
-    def _report(self, plan: Plan, folder: Path, target: Path) -> Path:
-        """Write the report, without replays where what writes them is not installed."""
-        writer: Writer | None = None
-        if not self.no_replays:
-            try:
-                load_viser()
-                writer = write_replay
-            except DependencyNotInstalled as error:
-                print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
-        return write_report(folder, into=target, plan=plan, replay=writer)
+
+def _replay_writer() -> Writer | None:
+    """Return what writes replays, None where that is not installed."""
+    try:
+        load_viser()
+    except DependencyNotInstalled as error:
+        print(f"hydrone: the report has no replays: {error}", file=sys.stderr)
+        return None
+    return write_replay

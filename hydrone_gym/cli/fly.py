@@ -12,6 +12,7 @@ from hydrone_gym.cli.missions import MissionOptions, Prepared
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.flight_figures import draw_flight
 from hydrone_gym.evaluation.saved import FORMAT, VERSION, flight_record
+from hydrone_gym.evaluation.tables import Table, print_tables
 
 _TREE_ITERATIONS = 400  # samples of the tree figure
 
@@ -20,12 +21,9 @@ _TREE_ITERATIONS = 400  # samples of the tree figure
 class Fly(MissionOptions):
     """Fly the paper's experiments, print what happened and draw the figures."""
 
-    out: Path = Path("flights")
-    """Folder for figures and flight.json; made if missing."""
-    json: bool = False
-    """Print one JSON document instead of the table."""
-    no_figures: bool = False
-    """Draw no figures."""
+    out: Path = Path("flights")  # Folder for figures and flight.json; made if missing.
+    json: bool = False  # Print one JSON document instead of the table.
+    no_figures: bool = False  # Draw no figures.
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
@@ -38,78 +36,51 @@ class Fly(MissionOptions):
                 mission.policy.predict(mission.observation)  # loads the kernels: no cycle's time shall hold that
                 flight = fly(mission.env, mission.policy, seed=self.seed, scenario=mission.scenario)
                 bar.set_description(f"{mission.name}: drawing")
-                files = [] if self.no_figures else _draw(mission, flight, self.out)
-                figures = [str(file) for file in files]
+                figures = [] if self.no_figures else [str(file) for file in _draw(mission, flight, self.out)]
                 records.append({"name": mission.name, **flight_record(flight), "figures": figures})
-        self._report(records)
-        return 0 if all(record["success"] for record in records) else 1
-
-    def _report(self, records: list[dict[str, Any]]) -> None:
-        """Write flight.json, and print it or the table."""
         options = {"policy": self.policy, "seed": self.seed, "vehicle": self.vehicle}
         document = {"format": FORMAT, "version": VERSION, **options, "flights": records}
-        text = json.dumps(document, indent=1, allow_nan=False)
-        saved = self.out / "flight.json"
+        text, saved = json.dumps(document, indent=1, allow_nan=False), self.out / "flight.json"
         saved.write_text(text + "\n", encoding="utf-8")
         if self.json:
             print(text)
-            return
-        _print_table(records)
-        for path in [*(path for record in records for path in record["figures"]), saved]:
-            print(path)
+        else:
+            heads, columns = ("", *(record["name"] for record in records)), [_cells(record) for record in records]
+            print_tables([Table("", heads, tuple(zip(columns[0], *(column.values() for column in columns))))])
+            print(*(path for record in records for path in record["figures"]), saved, sep="\n")
+        return 0 if all(record["success"] for record in records) else 1
 
 
 def _draw(mission: Prepared, flight: Flight, folder: Path) -> list[Path]:
-    """Write the figures of one mission; return their paths."""
+    """Write the figures of a mission and return their paths.
+
+    Of a planner with `grow_tree` also the tree that it grows from the start, every obstacle known (paper, Fig. 5).
+    """
     files = draw_flight(flight, mission.env.get_wrapper_attr("simulation"), folder, mission.name)
-    return files + _draw_tree(mission, folder)
-
-
-def _draw_tree(mission: Prepared, folder: Path) -> list[Path]:
-    """Draw the tree that a planner with `grow_tree` grows from the start, every obstacle known (paper, Fig. 5)."""
     grow_tree = getattr(mission.policy, "grow_tree", None)
     if grow_tree is None:
-        return []
+        return files
     from hydrone_gym.rendering.figures import plot_tree, save_figure
 
-    everything = {**mission.observation, "obstacles": mission.scenario.obstacles}
-    tree = grow_tree(everything, _TREE_ITERATIONS)
-    world = mission.env.get_wrapper_attr("world")
+    tree = grow_tree({**mission.observation, "obstacles": mission.scenario.obstacles}, _TREE_ITERATIONS)
     title = f"{mission.name.replace('-', ' ').capitalize()}: tree of {len(tree.edges)} edges, every obstacle known"
-    figure = plot_tree(tree, mission.scenario, world, title=title)
-    return save_figure(figure, folder / f"{mission.name}-tree")
-
-
-def _print_table(records: list[dict[str, Any]]) -> None:
-    """Print one column a flight on stdout."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(header_style="bold")
-    table.add_column("")
-    for record in records:
-        table.add_column(record["name"], justify="right")
-    columns = [_cells(record) for record in records]
-    for label in columns[0]:
-        table.add_row(label, *(column[label] for column in columns))
-    Console().print(table)
+    figure = plot_tree(tree, mission.scenario, mission.env.get_wrapper_attr("world"), title=title)
+    return files + save_figure(figure, folder / f"{mission.name}-tree")
 
 
 def _cells(record: dict[str, Any]) -> dict[str, str]:
     """Format what the table shows of one flight, label to text."""
-    crossings = record["transitions"]
 
     def each(key: str, scale: float, digits: int) -> str:
-        return ", ".join(f"{scale * crossing[key]:.{digits}f}" for crossing in crossings) or "-"
+        return ", ".join(f"{scale * crossing[key]:.{digits}f}" for crossing in record["transitions"]) or "-"
 
-    clearance = record["clearance"]
     return {
         "outcome": record["outcome"],
         "time (s)": f"{record['time']:.2f}",
         "crossing at (s)": each("time", 1.0, 2),
         "lateral speed at crossing (m/s)": each("lateral_speed", 1.0, 3),
         "tilt at crossing (°)": each("tilt", 180.0 / math.pi, 2),
-        "least clearance (m)": "-" if clearance is None else f"{clearance:.2f}",
+        "least clearance (m)": "-" if record["clearance"] is None else f"{record['clearance']:.2f}",
         "length (m)": f"{record['length']:.1f}",
         "energy (J)": f"{record['energy']:.0f}",
         "planning p50 (ms)": f"{record['planning_ms']['p50']:.2f}",

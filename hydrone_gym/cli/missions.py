@@ -29,46 +29,37 @@ class Prepared(NamedTuple):
 class MissionOptions:
     """What is flown."""
 
-    experiment: Literal[1, 2] | None = None
-    """1: air to water, 2: water to air; both unless given."""
-    seed: int = 0
-    """Seed of the random world and of the planner."""
-    obstacles: int | None = None
-    """Number of spheres, 20 unless given."""
+    experiment: Literal[1, 2] | None = None  # 1: air to water, 2: water to air; both unless given.
+    seed: int = 0  # Seed of the random world and of the planner.
+    obstacles: int | None = None  # Number of spheres, 20 unless given.
     policy: str = "clrrt"
     """Registered name such as clrrt or straight-line; module:attribute, file.py:attribute, or an agent's folder."""
-    iterations: int | None = None
-    """Samples the CL-RRT draws each cycle, the planner's own number unless given."""
+    iterations: int | None = None  # Samples the CL-RRT draws each cycle, the planner's own number unless given.
     time_budget: float | None = None
     """Seconds a CL-RRT cycle may take, instead of a number of samples; not reproducible."""
-    scenario: Path | None = None
-    """Fly this scenario file instead of an experiment."""
-    vehicle: Literal["paper", "physical"] = "paper"
-    """Parameter set of the vehicle."""
+    scenario: Path | None = None  # Fly this scenario file instead of an experiment.
+    vehicle: Literal["paper", "physical"] = "paper"  # Parameter set of the vehicle.
 
     def prepare(self) -> list[Prepared]:
         """Check the options and set up what they ask for; raises ValueError or OSError."""
         if self.seed < 0:
             raise ValueError(f"--seed must not be negative, got {self.seed}")
         check_obstacles(self.obstacles)
-        source = self._source()
-        if self.scenario is None:
-            numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
-            count = 20 if self.obstacles is None else self.obstacles
-            return [self._made(f"experiment-{k}", EXPERIMENTS[k], count, None, source) for k in numbers]
-        if self.experiment is not None or self.obstacles is not None:
-            raise ValueError("--scenario excludes --experiment and --obstacles")
-        scenario = load_scenario(self.scenario)
-        count = len(scenario.obstacles)
-        return [self._made(self.scenario.stem, "HydroneGym/Mission-v0", count, scenario, source)]
-
-    def _made(
-        self, name: str, env_id: str, obstacles: int, scenario: Scenario | None, source: PolicySource
-    ) -> Prepared:
-        """Make environment and policy; without a scenario the seed draws one."""
-        env = gym.make(env_id, num_obstacles=obstacles, vehicle=self.vehicle)
-        observation, _ = env.reset(seed=self.seed, options=None if scenario is None else {"scenario": scenario})
-        return Prepared(name, env, source.make(env, self.seed), env.get_wrapper_attr("scenario"), observation)
+        source, scenario, count = self._source(), None, 20 if self.obstacles is None else self.obstacles
+        numbers = tuple(EXPERIMENTS) if self.experiment is None else (self.experiment,)
+        flights = {f"experiment-{number}": EXPERIMENTS[number] for number in numbers}
+        if self.scenario is not None:
+            if self.experiment is not None or self.obstacles is not None:
+                raise ValueError("--scenario excludes --experiment and --obstacles")
+            scenario = load_scenario(self.scenario)
+            count, flights = len(scenario.obstacles), {self.scenario.stem: "HydroneGym/Mission-v0"}
+        prepared = []
+        for name, env_id in flights.items():
+            env = gym.make(env_id, num_obstacles=count, vehicle=self.vehicle)
+            observation, _ = env.reset(seed=self.seed, options=None if scenario is None else {"scenario": scenario})
+            policy, drawn = source.make(env, self.seed), env.get_wrapper_attr("scenario")
+            prepared.append(Prepared(name, env, policy, drawn, observation))
+        return prepared
 
     def _source(self) -> PolicySource:
         """Find the policy, with the options that belong to the CL-RRT alone."""

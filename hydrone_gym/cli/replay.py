@@ -26,8 +26,8 @@ from hydrone_gym.rendering.stage import Tree
 from hydrone_gym.simulation.simulation import Simulation
 
 RECORDERS = "hydrone_gym.recorders"  # entry points: "trees" wraps a policy and keeps its trees as `trees`
-_OF_FILES, _OF_EVALUATIONS = {"flight"}, {"suite", "mission", "world"}
-_OF_PAGES = {"saved", "out", "open", "json"}
+_ROW = ("policy", "suite", "mission", "world")  # options that name a row of an evaluation
+_PAGES = {"saved", "out", "open", "json"}
 
 
 class Take(NamedTuple):
@@ -46,32 +46,28 @@ class Replay(MissionOptions):
 
     saved: tyro.conf.Positional[Path | None] = None
     """A flight.json of `hydrone fly`, or the folder of an evaluation; without it, a fresh flight."""
-    flight: str | None = None
-    """Of a flight.json: only the flight of this name."""
-    suite: str | None = None
-    """Of an evaluation: the suite, if there are several."""
-    mission: str | None = None
-    """Of an evaluation: the mission, if there are several."""
-    world: int | None = None
-    """Of an evaluation: the number of the world; --policy is the name in its tables."""
-    out: Path = Path("replay.html")
-    """File to write, or folder for it; for several flights their names are appended."""
-    open: bool = False
-    """Open the page in the browser."""
-    json: bool = False
-    """Print one JSON document instead of the names of the files."""
+    flight: str | None = None  # Of a flight.json: only the flight of this name.
+    suite: str | None = None  # Of an evaluation: the suite, if there are several.
+    mission: str | None = None  # Of an evaluation: the mission, if there are several.
+    world: int | None = None  # Of an evaluation: the number of the world; --policy is the name in its tables.
+    out: Path = Path("replay.html")  # File to write, or folder for it; for several flights their names are appended.
+    open: bool = False  # Open the page in the browser.
+    json: bool = False  # Print one JSON document instead of the names of the files.
 
     def run(self) -> int:
         """Fly, write the pages and return the exit code."""
         load_viser()
-        takes = self._takes()
-        pages = self._write(takes)
-        if self.json:
-            shown = [_described(take, page) for take, page in zip(takes, pages, strict=True)]
-            print(json.dumps({"format": "hydrone_gym replays", "version": 1, "replays": shown}, indent=1))
-        else:
-            for page in pages:
-                print(page)
+        takes, shown, pages = self._takes(), [], []
+        out = self.out if self.out.suffix == ".html" else self.out / "replay.html"
+        out.parent.mkdir(parents=True, exist_ok=True)
+        for name, title, flight, simulation, trees in takes:
+            page = out if len(takes) == 1 else out.with_name(f"{out.stem}-{name}.html")
+            write_replay(flight, simulation, page, title=title, trees=trees)
+            facts = {"outcome": flight.outcome.name, "time": flight.time, "trees": sum(len(t.edges) > 0 for t in trees)}
+            shown.append({"name": name, "title": title, "page": str(page), **facts})
+            pages.append(page)
+        document = {"format": "hydrone_gym replays", "version": 1, "replays": shown}
+        print(json.dumps(document, indent=1) if self.json else "\n".join(map(str, pages)))
         for page in pages if self.open else ():
             webbrowser.open(page.resolve().as_uri())
         return 0
@@ -79,14 +75,12 @@ class Replay(MissionOptions):
     def _takes(self) -> list[Take]:
         """Fly what is asked for."""
         if self.saved is None:
-            self._refuse(_OF_FILES | _OF_EVALUATIONS, "a fresh flight")
+            self._take_only({field.name for field in fields(MissionOptions)}, "a fresh flight")
             return self._fresh()
         if self.saved.is_dir():
-            kept = _OF_EVALUATIONS | {"policy"}
-            self._refuse({field.name for field in fields(self)} - kept - _OF_PAGES, "an evaluation")
+            self._take_only(set(_ROW), "an evaluation")
             return [self._evaluated(self.saved)]
-        kept = _OF_FILES | _OF_PAGES
-        self._refuse({field.name for field in fields(self)} - kept, "a saved flight")
+        self._take_only({"flight"}, "a saved flight")
         flights = read_flights(self.saved)
         chosen = [saved for saved in flights if self.flight in (None, saved.name)]
         if not chosen:
@@ -94,13 +88,13 @@ class Replay(MissionOptions):
             raise ValueError(f"--flight must be one of {names}, got {self.flight!r}")
         return [_restored(saved) for saved in chosen]
 
-    def _refuse(self, names: set[str], source: str) -> None:
-        """Raise ValueError if one of these options was given another value than its default."""
-        given = sorted(f.name for f in fields(self) if f.name in names and getattr(self, f.name) != f.default)
+    def _take_only(self, names: set[str], source: str) -> None:
+        """Raise ValueError if an option not among these, nor one of pages, has another value than its default."""
+        others = [field for field in fields(self) if field.name not in names | _PAGES]
+        given = sorted(field.name for field in others if getattr(self, field.name) != field.default)
         if given:
-            raise ValueError(
-                f"{', '.join('--' + name.replace('_', '-') for name in given)} cannot be used with {source}"
-            )
+            listed = ", ".join("--" + name.replace("_", "-") for name in given)
+            raise ValueError(f"{listed} cannot be used with {source}")
 
     def _fresh(self) -> list[Take]:
         """Fly the missions of the options."""
@@ -108,7 +102,8 @@ class Replay(MissionOptions):
         for mission in self.prepare():
             recorder = tree_recorder(mission.policy)
             flight = fly(mission.env, recorder, seed=self.seed, scenario=mission.scenario)
-            takes.append(_take(mission.name, self.policy, self.seed, mission.env, flight, recorder.trees))
+            title, simulation = _title(mission.name, self.policy, self.seed), mission.env.get_wrapper_attr("simulation")
+            takes.append(Take(mission.name, title, flight, simulation, recorder.trees))
         return takes
 
     def _evaluated(self, folder: Path) -> Take:
@@ -126,12 +121,12 @@ class Replay(MissionOptions):
         flight, simulation = fly_record(record, plan)
         if not record.same_flight(record_of(record.key, flight)):
             print("hydrone: this flight differs from its row: code or clock led elsewhere", file=sys.stderr)
-        title = f"{record.policy}: {record.place}"
-        return Take(f"{record.policy}-{record.mission}-{record.world}", title, flight, simulation, recorders[-1].trees)
+        name, title = f"{record.policy}-{record.mission}-{record.world}", f"{record.policy}: {record.place}"
+        return Take(name, title, flight, simulation, recorders[-1].trees)
 
     def _row(self, records: Sequence[Record]) -> Record:
         """Return the one row that the options name; ValueError where none or several fit."""
-        for name in ("policy", "suite", "mission", "world"):
+        for name in _ROW:
             wanted, there = getattr(self, name), list(dict.fromkeys(getattr(record, name) for record in records))
             if wanted is None and len(there) == 1:
                 continue
@@ -141,15 +136,6 @@ class Replay(MissionOptions):
             records = [record for record in records if getattr(record, name) == wanted]
         return records[0]
 
-    def _write(self, takes: list[Take]) -> list[Path]:
-        """Write the pages; return their paths."""
-        out = self.out if self.out.suffix == ".html" else self.out / "replay.html"
-        out.parent.mkdir(parents=True, exist_ok=True)
-        pages = [out if len(takes) == 1 else out.with_name(f"{out.stem}-{take.name}.html") for take in takes]
-        for take, page in zip(takes, pages, strict=True):
-            write_replay(take.flight, take.simulation, page, title=take.title, trees=take.trees)
-        return pages
-
 
 def _restored(saved: SavedFlight) -> Take:
     """Fly a saved flight again from its references, and its planner for the trees.
@@ -157,7 +143,8 @@ def _restored(saved: SavedFlight) -> Take:
     There are none where the policy is not a registered one or flies otherwise now.
     """
     env = gym.make("HydroneGym/Mission-v0", num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
-    flight, trees = restore(saved, env.get_wrapper_attr("simulation")), ()
+    simulation = env.get_wrapper_attr("simulation")
+    flight, trees = restore(saved, simulation), ()
     if saved.policy in known_policies():
         recorder = tree_recorder(find_policy(saved.policy).make(env, saved.seed))
         again = fly(env, recorder, seed=saved.seed, scenario=saved.scenario)
@@ -165,7 +152,7 @@ def _restored(saved: SavedFlight) -> Take:
             trees = recorder.trees
         else:
             print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
-    return _take(saved.name, saved.policy, saved.seed, env, flight, trees)
+    return Take(saved.name, _title(saved.name, saved.policy, saved.seed), flight, simulation, trees)
 
 
 def tree_recorder(policy: Policy) -> Any:
@@ -174,13 +161,5 @@ def tree_recorder(policy: Policy) -> Any:
     return recorder.load()(policy)
 
 
-def _take(name: str, policy: str, seed: int, env: gym.Env, flight: Flight, trees: Sequence[Tree]) -> Take:
-    title = f"{name[:1].upper()}{name[1:].replace('-', ' ')}, {policy}, seed {seed}"
-    return Take(name, title, flight, env.get_wrapper_attr("simulation"), trees)
-
-
-def _described(take: Take, page: Path) -> dict[str, Any]:
-    """Return what --json prints of a page."""
-    flight = take.flight
-    facts = {"outcome": flight.outcome.name, "time": flight.time, "trees": sum(len(t.edges) > 0 for t in take.trees)}
-    return {"name": take.name, "title": take.title, "page": str(page), **facts}
+def _title(name: str, policy: str, seed: int) -> str:
+    return f"{name[:1].upper()}{name[1:].replace('-', ' ')}, {policy}, seed {seed}"

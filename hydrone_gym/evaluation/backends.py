@@ -22,47 +22,40 @@ def runner(backend: str | None, jobs: int | None) -> Iterator[Runner]:
 
     Args:
         backend: "loky" (processes), "threading", "dask", "ray", or another one registered with joblib; None for the one
-            that `joblib.parallel_config` has set, this process unless told otherwise.
+            that `joblib.parallel_config` has set, this process unless told otherwise. Dask uses the client of this
+            process or makes one: of the cluster that the configuration names (DASK_SCHEDULER_ADDRESS), else a local
+            one. Ray joins RAY_ADDRESS or starts locally.
         jobs: how many at once; None for as many as there are cores, on a cluster those of the cluster, or what
             `parallel_config` has set where no backend is named.
 
-    Dask uses the client of this process or makes one: of the cluster that the configuration names
-    (DASK_SCHEDULER_ADDRESS), else a local one. Ray joins RAY_ADDRESS or starts locally.
-
-    Raises:
-        ValueError: a backend that joblib does not know or that lacks its package, or a number of jobs out of range.
+    Raises ValueError for a backend that joblib does not know or that lacks its package, or jobs out of range.
     """
     import joblib
 
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= MOST_JOBS):
         raise ValueError(f"jobs must be a whole number of at least 1, at most {MOST_JOBS}, got {jobs!r}")
+    options: dict[str, Any] = {} if jobs is None else {"n_jobs": jobs}  # all others stay as the user set them
+    if backend is not None:
+        options = {"backend": backend, "n_jobs": jobs or -1}
+    if backend == "loky":  # the workers of the others have one thread anyhow
+        options |= {"inner_max_num_threads": 1, "idle_worker_timeout": _IDLE}
     with contextlib.ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         # work under way when an evaluation stops is flown again when it goes on
         warnings.filterwarnings("ignore", message=".*adjusting the input task", category=UserWarning)
-        if backend == "dask":
-            _dask(stack, jobs)
-        elif backend == "ray":
-            _ray(stack, jobs)
-        stack.enter_context(_configured(backend, jobs))
+        if backend in _STARTED:
+            try:
+                _STARTED[backend](stack, jobs)
+            except ImportError as error:
+                needed = f'it needs: pip install "hydrone-gym[{backend}]"'
+                raise ValueError(f"backend {backend}: {error}; {needed}") from error
+        stack.enter_context(joblib.parallel_config(**options))
         try:
             parallel = joblib.Parallel(return_as="generator")
         except ValueError:  # a backend that returns results only all at once: Ray's, for one
             yield _in_portions
         else:
             yield parallel
-
-
-def _configured(backend: str | None, jobs: int | None) -> contextlib.AbstractContextManager[Any]:
-    """Return the configuration of joblib; where no backend is named that of the user stays."""
-    import joblib
-
-    if backend == "loky":  # the workers of the others have one thread anyhow
-        options = {"inner_max_num_threads": 1, "idle_worker_timeout": _IDLE}
-        return joblib.parallel_config(backend=backend, n_jobs=jobs or -1, **options)
-    if backend is not None:
-        return joblib.parallel_config(backend=backend, n_jobs=jobs or -1)
-    return contextlib.nullcontext() if jobs is None else joblib.parallel_config(n_jobs=jobs)
 
 
 def _in_portions(calls: Iterable[Any]) -> Generator[Any, None, None]:
@@ -76,46 +69,33 @@ def _in_portions(calls: Iterable[Any]) -> Generator[Any, None, None]:
 
 
 def _dask(stack: contextlib.ExitStack, jobs: int | None) -> None:
-    """See to it that there is a client."""
-    try:
-        import dask
-        from distributed import Client
-    except ImportError as error:
-        raise ValueError(f'backend dask: {error}; it needs: pip install "hydrone-gym[dask]"') from error
+    """See to it that there is a client; processes that it starts here leave Ctrl-C to this one."""
+    import dask
+    from distributed import Client
+
     try:
         Client.current()
     except ValueError:
         if dask.config.get("scheduler-address", None) is not None:
             stack.enter_context(Client())
             return
-        with _children_deaf_to_interrupts():
+        with contextlib.ExitStack() as deaf:
+            if threading.current_thread() is threading.main_thread():
+                deaf.callback(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, signal.SIG_IGN))
             client = Client(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
         stack.enter_context(client)
 
 
-@contextlib.contextmanager
-def _children_deaf_to_interrupts() -> Iterator[None]:
-    """Let processes started within ignore Ctrl-C, which is this process's to handle: they would print tracebacks."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 def _ray(stack: contextlib.ExitStack, jobs: int | None) -> None:
     """See to it that this process belongs to a cluster, and that joblib knows of it."""
-    try:
-        import ray
-        from ray.util.joblib import register_ray
-    except ImportError as error:
-        raise ValueError(f'backend ray: {error}; it needs: pip install "hydrone-gym[ray]"') from error
+    import ray
+    from ray.util.joblib import register_ray
+
     register_ray()
-    if ray.is_initialized():
-        return
-    local: dict[str, Any] = {} if "RAY_ADDRESS" in os.environ else {"num_cpus": jobs, "include_dashboard": False}
-    ray.init(logging_level=logging.ERROR, log_to_driver=False, **local)
-    stack.callback(ray.shutdown)
+    if not ray.is_initialized():
+        local: dict[str, Any] = {} if "RAY_ADDRESS" in os.environ else {"num_cpus": jobs, "include_dashboard": False}
+        ray.init(logging_level=logging.ERROR, log_to_driver=False, **local)
+        stack.callback(ray.shutdown)
+
+
+_STARTED = {"dask": _dask, "ray": _ray}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hydrone_gym.envs.hydrone_env import HydroneEnv
 from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import row_at, trajectory
+from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 from hydrone_gym.world.scenario import Scenario
 
 _TOLD = ("outcome", "time", "energy", "clearance", "transitions")  # by the last `info` of an episode
@@ -63,19 +63,17 @@ class Flight(Ending):
 
 
 def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scenario | None = None) -> Flight:
-    """Fly one episode and return its record.
+    """Fly one episode of a HyDrone environment with `interface="world"`, wrapped or not, and return its record.
 
-    Args:
-        env: a HyDrone environment with `interface="world"`, wrapped or not.
-        policy: chooses the references; its memory is new.
-        seed: seeds the environment's random stream.
-        scenario: what to fly, None for one that the environment draws.
+    The policy's memory is new; the environment draws what is flown unless a `scenario` is given.
 
-    Raises:
-        TypeError: an environment of another kind.
-        ValueError: another interface, or a scenario that this environment cannot fly.
+    Raises TypeError for an environment of another kind, ValueError for another interface, or a scenario not for it.
     """
-    world = _world_env(env)
+    world = env.unwrapped
+    if not isinstance(world, HydroneEnv):
+        raise TypeError(f"fly needs a HyDrone environment, got {type(world).__name__}")
+    if world.options.interface != "world":
+        raise ValueError(f'fly needs an environment with interface="world", got {world.options.interface!r}')
     observation, info = env.reset(seed=seed, options=None if scenario is None else {"scenario": scenario})
     states, references, decisions, rewards = [observation["state"]], [], [], []
     memory, start, done = None, np.array([True]), False
@@ -88,7 +86,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         references.append(observation["reference"])
         rewards.append(float(reward))
         start, done = np.array([False]), terminated or truncated
-    trace = _trace(world, states[0], np.array(references))
+    trace = trace_of(world.simulation, world.scenario, states[0], np.array(references))
     return Flight(
         obstacles=len(world.scenario.obstacles),
         scenario=world.scenario,
@@ -115,8 +113,7 @@ def fly_worlds(
         seed: row i flies the world that a single environment draws from ``seed + i``.
         scenarios: what to fly, one a row, None for drawn worlds.
 
-    Returns:
-        How the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
+    Returns how the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
     """
     observation, _ = env.reset(seed=seed, options=None if scenarios is None else {"scenario": list(scenarios)})
     running, memory, starts = np.arange(env.num_envs), None, np.ones(env.num_envs, bool)
@@ -132,9 +129,8 @@ def fly_worlds(
         over = info["outcome"][running] != Outcome.RUNNING
         for k in np.flatnonzero(over):
             row = running[k]
-            told = {key: info[key][row] for key in _TOLD}
             endings[row] = Ending(
-                **{**told, "outcome": Outcome(told["outcome"])},
+                **{key: info[key][row] for key in _TOLD} | {"outcome": Outcome(info["outcome"][row])},
                 obstacles=observation["obstacles"].shape[1] if scenarios is None else len(scenarios[row].obstacles),
                 length=None,
                 episode_return=float(returns[row]),
@@ -161,19 +157,9 @@ def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
     return memory[rows] if isinstance(memory, np.ndarray) else tuple(memory[row] for row in rows)
 
 
-def _world_env(env: gym.Env) -> HydroneEnv:
-    """Return the environment under its wrappers, or say why it cannot be flown."""
-    inner = env.unwrapped
-    if not isinstance(inner, HydroneEnv):
-        raise TypeError(f"fly needs a HyDrone environment, got {type(inner).__name__}")
-    if inner.options.interface != "world":
-        raise ValueError(f'fly needs an environment with interface="world", got {inner.options.interface!r}')
-    return inner
-
-
-def _trace(env: HydroneEnv, start: NDArray[np.float64], references: NDArray[np.float64]) -> Trace:
-    """Play the references again, tick by tick: the same kernel, so the same flight bit for bit."""
-    row = row_at(start, np.array(env.scenario.goal))
-    obstacles = env.scenario.obstacles.copy()  # read-only arrays would compile the kernel once more
-    times, states, moving, _ = trajectory(env.simulation, row, references, obstacles)
-    return Trace(times, states, moving)
+def trace_of(
+    simulation: Simulation, scenario: Scenario, start: NDArray[np.float64], references: NDArray[np.float64]
+) -> Trace:
+    """Play references again from a state, tick by tick: the same kernel, so the same flight bit for bit."""
+    row = row_at(start, np.array(scenario.goal))
+    return Trace(*trajectory(simulation, row, references, scenario.obstacles)[:3])

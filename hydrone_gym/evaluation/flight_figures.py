@@ -1,14 +1,59 @@
-"""The figures of a flight: path, position and attitude over time."""
+"""The figures of a flight: path, position and attitude over time, with the attitude that the control law asks for."""
 
 from pathlib import Path
+from typing import Any
 
-from hydrone_gym.evaluation.attitude import attitude_references
-from hydrone_gym.evaluation.flight import Flight
-from hydrone_gym.simulation.simulation import Simulation
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym._jit import kernel
+from hydrone_gym._memory import gather
+from hydrone_gym.control.law import tracked
+from hydrone_gym.control.laws import named_law
+from hydrone_gym.control.reference import Instant, Reference
+from hydrone_gym.evaluation.flight import Flight, Trace
+from hydrone_gym.physics.dynamics import medium_at
+from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
+from hydrone_gym.simulation.simulation import TICK, Simulation
+from hydrone_gym.simulation.storage import vehicle_of, world_of
+from hydrone_gym.surface import is_air
+
+
+@kernel
+def _write_references(
+    states: NDArray, moving: NDArray, values: NDArray[np.float64], gains: Any, out: NDArray[np.float64]
+) -> None:
+    """Write the attitude reference (φ, θ, ψ) of every sample; NaN where a law has none.
+
+    Shapes: states (N, 12), moving (N, 4), values packed `Model`, gains of the law, out (N, 3).
+    """
+    vehicle, world = vehicle_of(values), world_of(values)
+    for n in range(states.shape[0]):
+        state = gather(states[n], 0, 0, 1, State)
+        # the reference moves evenly within a period; at rest before the first
+        old, new = moving[max(n - 1, 0)], moving[n]
+        vx, vy, vz = (new[0] - old[0]) / TICK, (new[1] - old[1]) / TICK, (new[2] - old[2]) / TICK
+        reference = Reference(new[0], new[1], new[2], new[3], vx, vy, vz)
+        attitude, air = attitude_of(state), is_air(state.z)
+        rates = euler_rates(attitude, state.p, state.q, state.r)
+        vertical = abs(state.z) <= world.zone and world.vertical_mode > 0.0
+        now = Instant(state, attitude, rates, reference, vertical, air, medium_at(vehicle, air))
+        out[n, 0], out[n, 1], out[n, 2] = tracked(gains, now)
+
+
+def attitude_references(simulation: Simulation, trace: Trace) -> NDArray[np.float64]:
+    """Return roll, pitch and yaw (rad) that the control law tracks at every tick of a trace, (N, 3).
+
+    What a law does not track is NaN: by the paper's law roll is free in water, and yaw while the vehicle holds still.
+    """
+    out = np.empty((len(trace.times), 3))
+    gains = named_law(simulation.law).gains_of(simulation.vehicle)
+    _write_references(trace.states, trace.references, simulation.values, gains, out)
+    return out
 
 
 def draw_flight(flight: Flight, simulation: Simulation, directory: Path, name: str) -> list[Path]:
-    """Write the figures of a flight, path, position and attitude, as PNG and PDF; return their paths.
+    """Write path, position and attitude of a flight as PNG and PDF; return the paths.
 
     `simulation` is that of the environment it was flown in; `name` begins the name of every file in the existing
     `directory`, and with a capital letter every title.
@@ -16,28 +61,15 @@ def draw_flight(flight: Flight, simulation: Simulation, directory: Path, name: s
     from hydrone_gym.rendering.figures import plot_attitude, plot_path, plot_position, save_figure
 
     times, states, references = flight.trace
-    world, goal = simulation.world, flight.scenario.goal
-    title = name[:1].upper() + name[1:].replace("-", " ")
-    ending = f"{flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"
-    path = plot_path(
-        states[:, :3],
-        goal,
-        flight.detected,
-        flight.undetected,
-        lower=world.lower,
-        upper=world.upper,
-        title=f"{title}: {ending}",
-    )
-    position = plot_position(
-        times, states[:, :3], references[:, :3], zone=world.zone, title=f"{title}: position over time"
-    )
-    attitude = plot_attitude(
-        times,
-        states[:, 3:6],
-        attitude_references(simulation, flight.trace),
-        states[:, 2],
-        zone=world.zone,
-        title=f"{title}: attitude over time",
-    )
-    figures = {"path": path, "position": position, "attitude": attitude}
+    world, position, wanted = simulation.world, states[:, :3], attitude_references(simulation, flight.trace)
+    title, zone = name[:1].upper() + name[1:].replace("-", " "), world.zone
+    ending = f"{title}: {flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"
+    spheres = (flight.detected, flight.undetected)
+    figures = {
+        "path": plot_path(position, flight.scenario.goal, *spheres, lower=world.lower, upper=world.upper, title=ending),
+        "position": plot_position(times, position, references[:, :3], zone=zone, title=f"{title}: position over time"),
+        "attitude": plot_attitude(
+            times, states[:, 3:6], wanted, states[:, 2], zone=zone, title=f"{title}: attitude over time"
+        ),
+    }
     return [file for kind, figure in figures.items() for file in save_figure(figure, directory / f"{name}-{kind}")]

@@ -6,19 +6,20 @@ The page loads nothing: styles and figures are inside it. It links to the rows, 
 import os
 import shlex
 import shutil
-import string
-from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
-from hydrone_gym.evaluation.page_figures import SEVERAL, Chart, charts_of
+import jinja2
+
+from hydrone_gym.evaluation.page_figures import SEVERAL, charts_of
 from hydrone_gym.evaluation.plan import Plan, plan_of
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
 from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
-from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary
-from hydrone_gym.evaluation.tables import tables_of
+from hydrone_gym.evaluation.summary import ALL_MISSIONS
+from hydrone_gym.evaluation.tables import Table, tables_of
 from hydrone_gym.rendering.comparison import colour
 
 PAGE = "report.html"
@@ -50,10 +51,8 @@ def write_report(
         replay: writes the replay of a flight, as `rendering.replay.write_replay` does. Without one the page names the
             worlds and the command that shows them.
 
-    Raises:
-        FileNotFoundError: no rows or no summary; a suite that cannot be found again.
-        ValueError: rows or summary that are damaged or do not fit each other; policies that cannot be found again.
-        OSError: files that cannot be written.
+    Raises FileNotFoundError for no rows or summary, or a suite that cannot be found again, ValueError for those that
+    are damaged or do not fit each other, or policies that cannot be found again.
     """
     source = Path(folder)
     target = source if into is None else Path(into)
@@ -67,39 +66,40 @@ def write_report(
     flown: Written = {}
     if replay is not None:
         flown = write_replays(shown, plan or plan_of(stored.arguments), target / REPLAYS, replay)
-    write_whole(target / PAGE, _page(stored, shown, flown, target))
+    options: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "undefined": jinja2.StrictUndefined}
+    template = jinja2.Environment(**options).from_string(_TEMPLATE.read_text(encoding="utf-8"))
+    write_whole(target / PAGE, template.render(_content(stored, shown, flown, target)))
     return target / PAGE
 
 
-def _page(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> str:
-    """Fill the template."""
-    suites = list(stored.arguments["suites"])
-    several = f"{len(stored.policies)} policies" if len(stored.policies) > 1 else stored.policies[0]
-    worlds = len({record.key[:3] for record in stored.records})
-    vehicle = stored.arguments["vehicle"]
-    lead = f"{len(stored.records):,} flights in {worlds:,} worlds, the vehicle with its {vehicle} parameters."
-    files = [f"<li>{_link(name, name)}: {words}</li>" for name, words in _FILES.items() if (folder / name).exists()]
-    versions = stored.document["versions"]
-    return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        title=escape(f"{several} on {_listed(suites)}"),
-        lead=escape(lead),
-        about=_about(stored),
-        tables=_lines(_suite_tables(stored, suite) for suite in suites),
-        figures=_lines(map(_chart, charts_of(stored.records, stored.summaries))),
-        replays=_replays(stored, shown, flown, folder),
-        files=f"<ul>\n{_lines(files)}\n</ul>",
-        footer=escape(f"Written by hydrone_gym {versions.get('hydrone-gym', '')}, {stored.document['date']}."),
-    )
+def _content(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> dict[str, Any]:
+    """Return what the template is filled with."""
+    document, suites, policies = stored.document, list(stored.arguments["suites"]), stored.policies
+    several = f"{len(policies)} policies" if len(policies) > 1 else policies[0]
+    flights, worlds = len(stored.records), len({record.key[:3] for record in stored.records})
+    vehicle = f"the vehicle with its {stored.arguments['vehicle']} parameters"
+    return {
+        "title": f"{several} on {_listed(suites)}",
+        "lead": f"{flights:,} flights in {worlds:,} worlds, {vehicle}.",
+        "colours": {policy: colour(index) for index, policy in enumerate(policies)},
+        "facts": _facts(stored),
+        "suites": [(suite, *_tables(stored, suite)) for suite in suites],
+        "unfolded": _UNFOLDED,
+        "charts": charts_of(stored.records, stored.summaries),
+        "shown": [(policy, [_flight(record, flown, folder) for record in records]) for policy, *records in shown],
+        "command": "" if flown else _command(shown[0].worst),
+        "files": {name: words for name, words in _FILES.items() if (folder / name).exists()},
+        "footer": f"Written by hydrone_gym {document['versions'].get('hydrone-gym', '')}, {document['date']}.",
+    }
 
 
-def _about(stored: Stored) -> str:
-    """Return what was compared, and with what, as a list of facts."""
+def _facts(stored: Stored) -> dict[str, str]:
+    """Say what was compared, and with what."""
     document, arguments = stored.document, stored.arguments
     planned = len(arguments["policies"]) * sum(sum(worlds.values()) for worlds in arguments["worlds"].values())
     finished = "" if document["complete"] else f" of {planned:,}: the evaluation was stopped before its end"
     machine = document["machine"]
-    names = (f'<span class="name">{_spot(stored, name)}{escape(name)}</span>' for name in stored.policies)
-    facts = {
+    return {
         "Baseline": arguments["baseline"],
         "Worlds": "\n".join(_worlds(name, worlds) for name, worlds in arguments["worlds"].items()),
         "Flights": f"{len(stored.records):,}{finished}",
@@ -110,8 +110,6 @@ def _about(stored: Stored) -> str:
         "Machine": ", ".join(f"{value} cores" if key == "cores" else str(value) for key, value in machine.items()),
         "Versions": ", ".join(f"{name} {version}" for name, version in document["versions"].items()),
     }
-    shown = {"Policies": " ".join(names)} | {name: escape(text).replace("\n", "<br>") for name, text in facts.items()}
-    return "<dl>\n" + _lines(f"<dt>{name}</dt><dd>{words}</dd>" for name, words in shown.items()) + "\n</dl>"
 
 
 def _worlds(suite: str, missions: Mapping[str, int]) -> str:
@@ -122,82 +120,19 @@ def _worlds(suite: str, missions: Mapping[str, int]) -> str:
     return f"{suite}: {len(missions)} mission{'s' * (len(missions) > 1)}, {each} worlds each{names}"
 
 
-def _suite_tables(stored: Stored, suite: str) -> str:
-    """Return the tables of a suite: all missions together, then each, folded where they are many."""
+def _tables(stored: Stored, suite: str) -> tuple[list[Table], list[list[Table]]]:
+    """Return the tables of all missions of a suite together, if they are several, and those of each."""
     within = [summary for summary in stored.summaries if summary.suite == suite]
-    whole = [_tables(stored, summary) for summary in within if summary.mission == ALL_MISSIONS]
-    each = [_tables(stored, summary) for summary in within if summary.mission != ALL_MISSIONS]
-    if len(each) > _UNFOLDED:
-        each = [_folded(f"Tables of each of the {len(each)} missions", _lines(each))]
-    return f"<h3>{escape(suite)}</h3>\n{_lines([*whole, *each])}"
+    each = [tables_of([summary]) for summary in within if summary.mission != ALL_MISSIONS]
+    return tables_of([summary for summary in within if summary.mission == ALL_MISSIONS]), each
 
 
-def _tables(stored: Stored, summary: MissionSummary) -> str:
-    """Return the tables of a mission."""
-    ranked, compared = [p.policy for p in summary.policies], [c.policy for c in summary.comparisons]
-    shown = []
-    tables = tables_of([summary])
-    for table, policies in zip(tables, (ranked, ranked, compared), strict=False):  # as `tables_of` orders them
-        rows = [
-            f"<tr>{_named(stored, policy, first)}{''.join(f'<td>{_figure(cell)}</td>' for cell in cells)}</tr>"
-            for policy, (first, *cells) in zip(policies, table.rows, strict=True)
-        ]
-        shown.append(_scrolled("", table.title, table.heads, rows))
-    return _lines(shown)
-
-
-def _figure(cell: str) -> str:
-    """Return a cell with its interval in small letters."""
-    value, bracket, interval = escape(cell).partition(" [")
-    return f"{value} <small>[{interval}</small>" if bracket else value
-
-
-def _scrolled(kind: str, title: str, heads: Iterable[str], rows: Iterable[str]) -> str:
-    """Return a table in a box that scrolls where the window is narrow; `kind` and `rows` are HTML."""
-    columns = "".join(f'<th scope="col">{escape(name).replace(chr(10), "<br>")}</th>' for name in heads)
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(title)}"><table{kind}>\n'
-        f"<caption><span>{escape(title)}</span></caption>\n<thead><tr>{columns}</tr></thead>\n"
-        f"<tbody>\n{_lines(rows)}\n</tbody>\n</table></div>"
-    )
-
-
-def _chart(chart: Chart) -> str:
-    """Return a chart: heading, caption, panels, and the folded ones."""
-    name = chart.heading.lower().replace(" ", "-")
-    panels, folded = (f'<div class="panels">\n{_lines(part)}\n</div>' for part in (chart.panels, chart.folded))
-    if chart.folded:
-        panels += "\n" + _folded(f"Each of {len(chart.folded)} missions", folded)
-    caption = f"<figcaption>{escape(chart.caption)}</figcaption>"
-    return f'<h3 id="{name}">{escape(chart.heading)}</h3>\n<figure>\n{caption}\n{panels}\n</figure>'
-
-
-def _replays(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> str:
-    """Return the table of the flights that show each policy, with links or with how to fly them."""
-    rows = []
-    for entry in shown:
-        flights = (entry.best, entry.median, entry.worst)
-        cells = "".join(f"<td>{_flight(record, flown.get(record), folder)}</td>" for record in flights)
-        rows.append(f"<tr>{_named(stored, entry.policy)}{cells}</tr>")
-    chosen = (
-        "<p>Best arrived soonest, median is in the middle by time of those that arrived. Worst is the soonest "
-        "collision; without one the soonest rough crossing, then any other failure, then the slowest flight. "
-        "Worlds count from 0.</p>"
-    )
-    heads = ("policy", "best", "median", "worst")
-    table = _scrolled(' class="words"', "Flights that show each policy", heads, rows)
-    return "\n".join([chosen, table, "" if flown else _recipe(shown[0].worst)])
-
-
-def _flight(record: Record, flown: tuple[Path, Record] | None, folder: Path) -> str:
-    """Return a cell: how a flight ended, linked to its replay, and where it was."""
-    ending = escape(_ending(record))
-    place = f"<br><small>{escape(record.place)}</small>"
-    if flown is None:
-        return ending + place
-    path, again = flown
-    differs = "" if record.same_flight(again) else f"<br><small>flown again: {escape(_ending(again))}</small>"
-    return _link(path.relative_to(folder).as_posix(), _ending(record)) + place + differs
+def _flight(record: Record, flown: Written, folder: Path) -> dict[str, str]:
+    """Say how a flight ended, where it was, and what its replay is and shows instead."""
+    path, again = flown.get(record, (None, record))
+    link = "" if path is None else quote(path.relative_to(folder).as_posix())
+    otherwise = "" if record.same_flight(again) else _ending(again)
+    return {"ending": _ending(record), "place": record.place, "link": link, "again": otherwise}
 
 
 def _ending(record: Record) -> str:
@@ -205,37 +140,11 @@ def _ending(record: Record) -> str:
     return f"{how} after {record.time:.1f}\u00a0s"
 
 
-def _recipe(record: Record) -> str:
-    """Say how to see a flight, with one as the example."""
+def _command(record: Record) -> str:
+    """Return the command that shows a flight."""
     names = {"policy": record.policy, "suite": record.suite, "mission": record.mission, "world": str(record.world)}
-    command = shlex.join(["hydrone", "replay", ".", *(f"--{name}={value}" for name, value in names.items())])
-    return (
-        "<p>In the folder of this page, a command such as the following flies one again and writes a page that plays "
-        f'it (it needs <code>pip install "hydrone-gym[replay]"</code>):</p>\n<pre>{escape(command)}</pre>'
-    )
-
-
-def _spot(stored: Stored, policy: str) -> str:
-    """Return a spot of the colour that a policy has in the figures."""
-    return f'<span class="swatch" style="background:{colour(stored.policies.index(policy))}"></span>'
-
-
-def _named(stored: Stored, policy: str, text: str = "") -> str:
-    """Return the head of a row: the name of a policy, or another text, behind its spot."""
-    return f'<th scope="row">{_spot(stored, policy)}{escape(text or policy)}</th>'
-
-
-def _link(path: str, text: str) -> str:
-    return f'<a href="{escape(quote(path))}">{escape(text)}</a>'
-
-
-def _folded(title: str, content: str) -> str:
-    return f"<details>\n<summary>{escape(title)}</summary>\n{content}\n</details>"
+    return shlex.join(["hydrone", "replay", ".", *(f"--{name}={value}" for name, value in names.items())])
 
 
 def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
-def _lines(parts: Iterable[str]) -> str:
-    return "\n".join(parts)

@@ -1,6 +1,5 @@
 """The figures of the report page: records into panels of `rendering.comparison`, with captions."""
 
-import html
 import math
 from base64 import b64encode
 from collections import Counter
@@ -37,13 +36,20 @@ flight's 50th and 99th percentile.""",
 }
 
 
+class Panel(NamedTuple):
+    """An image, as an address that holds it, and words that stand for it where it is not seen."""
+
+    address: str
+    words: str
+
+
 class Chart(NamedTuple):
     """A heading, a caption, panels, and panels that are folded away."""
 
     heading: str
     caption: str
-    panels: Sequence[str]
-    folded: Sequence[str] = ()
+    panels: Sequence[Panel]
+    folded: Sequence[Panel] = ()
 
 
 class _Measure(NamedTuple):
@@ -68,55 +74,37 @@ _SPEEDS = (
 )
 
 
-class _Group(NamedTuple):
-    """Flights that are drawn together: those of a mission, or of all missions of a suite."""
-
-    summary: MissionSummary
-    records: Sequence[Record]
-
-    @property
-    def title(self) -> str:
-        return f"{self.summary.suite}, {self.summary.mission}"
-
-
 def charts_of(records: Sequence[Record], summaries: Sequence[MissionSummary]) -> list[Chart]:
     """Draw all figures; those for which there is nothing to draw are left out."""
     policies = list(dict.fromkeys(record.policy for record in records))
     missions = Counter(s.suite for s in summaries if s.mission != ALL_MISSIONS)
-    shown, rest = [], []
-    for s in summaries:
-        flown = [r for r in records if r.suite == s.suite and s.mission in (r.mission, ALL_MISSIONS)]
-        few = missions[s.suite] <= SEVERAL
-        if few != (s.mission == ALL_MISSIONS):
-            shown.append(_Group(s, flown))
-        elif not few:
-            rest.append(_Group(s, flown))
+    shown = [s for s in summaries if (missions[s.suite] <= SEVERAL) != (s.mission == ALL_MISSIONS)]
+    rest = [s for s in summaries if missions[s.suite] > SEVERAL and s.mission != ALL_MISSIONS]
     panels = {
-        "Success": [_success(policies, group) for group in shown],
-        "Time and energy": _boxes(policies, shown, *_TIMES),
+        "Success": [_success(policies, summary) for summary in shown],
+        "Time and energy": _boxes(policies, records, shown, *_TIMES),
         "Success against density": _density(policies, records),
-        "Clearance": _boxes(policies, shown, _CLEARANCE),
-        "Speed at the crossing": _boxes(policies, shown, *_SPEEDS),
+        "Clearance": _boxes(policies, records, shown, _CLEARANCE),
+        "Speed at the crossing": _boxes(policies, records, shown, *_SPEEDS),
         "Time of a decision": [_decisions(policies, records)],
     }
-    folded = {"Success": [_success(policies, group) for group in rest]}
+    folded = {"Success": [_success(policies, summary) for summary in rest]}
     return [Chart(name, _CAPTIONS[name], drawn, folded.get(name, ())) for name, drawn in panels.items() if drawn]
 
 
-def _success(policies: Sequence[str], group: _Group) -> str:
-    rates = {entry.policy: entry.success for entry in group.summary.policies}
-    ordered = {policy: rates.get(policy) for policy in policies}
-    return _image(plot_success(ordered, title=group.title), f"Success: {group.title}")
+def _success(policies: Sequence[str], summary: MissionSummary) -> Panel:
+    rates, title = {entry.policy: entry.success for entry in summary.policies}, f"{summary.suite}, {summary.mission}"
+    return _panel(plot_success({policy: rates.get(policy) for policy in policies}, title=title), f"Success: {title}")
 
 
-def _density(policies: Sequence[str], records: Sequence[Record]) -> list[str]:
+def _density(policies: Sequence[str], records: Sequence[Record]) -> list[Panel]:
     panels = []
     for suite in dict.fromkeys(record.suite for record in records):
         flown = [record for record in records if record.suite == suite]
         counts = sorted({record.obstacles for record in flown})
         if len(counts) > 1:
             rates = {policy: [_rate(flown, policy, count) for count in counts] for policy in policies}
-            panels.append(_image(plot_density(counts, rates, title=suite), f"Success against density: {suite}"))
+            panels.append(_panel(plot_density(counts, rates, title=suite), f"Success against density: {suite}"))
     return panels
 
 
@@ -128,31 +116,36 @@ def _rate(records: Sequence[Record], policy: str, count: int) -> tuple[float, fl
     return (sum(ends) / len(ends), *wilson_interval(sum(ends), len(ends)))
 
 
-def _decisions(policies: Sequence[str], records: Sequence[Record]) -> str:
+def _decisions(policies: Sequence[str], records: Sequence[Record]) -> Panel:
     def middle(policy: str, name: str) -> float:
         return max(float(np.median([getattr(r, name) for r in records if r.policy == policy])), _LEAST_MS)
 
     times = {policy: (middle(policy, "decision_ms_p50"), middle(policy, "decision_ms_p99")) for policy in policies}
-    return _image(plot_decisions(times, title="p50 / p99 in ms"), "Times of decisions")
+    return _panel(plot_decisions(times, title="p50 / p99 in ms"), "Times of decisions")
 
 
-def _boxes(policies: Sequence[str], groups: Sequence[_Group], *measures: _Measure) -> list[str]:
-    """Draw the distributions of measures, those that a group has."""
+def _boxes(
+    policies: Sequence[str], records: Sequence[Record], shown: Sequence[MissionSummary], *measures: _Measure
+) -> list[Panel]:
+    """Draw the distributions of measures, those that the flights of a mission have."""
     panels = []
-    for group in groups:
+    for s in shown:
+        title, flown = f"{s.suite}, {s.mission}", [r for r in records if r.suite == s.suite]
         for column, label, scale, arrived, limit, limit_label in measures:
             values: dict[str, list[float]] = {policy: [] for policy in policies}
-            for record in group.records:
+            for record in flown:
                 value = getattr(record, column)
-                if value is not None and (record.success or not arrived):
+                if (
+                    s.mission in (record.mission, ALL_MISSIONS)
+                    and value is not None
+                    and (record.success or not arrived)
+                ):
                     values[record.policy].append(scale * value)
             if any(values.values()):
-                figure = plot_distributions(values, label, title=group.title, limit=limit, limit_label=limit_label)
-                panels.append(_image(figure, f"{label[:1].upper()}{label[1:]}: {group.title}"))
+                figure = plot_distributions(values, label, title=title, limit=limit, limit_label=limit_label)
+                panels.append(_panel(figure, f"{label[:1].upper()}{label[1:]}: {title}"))
     return panels
 
 
-def _image(figure: "Figure", words: str) -> str:
-    """Return a figure as an image inside HTML; `words` stand for it where it is not seen."""
-    content = b64encode(to_svg(figure, words).encode()).decode()
-    return f'<img src="data:image/svg+xml;base64,{content}" alt="{html.escape(words)}">'
+def _panel(figure: "Figure", words: str) -> Panel:
+    return Panel(f"data:image/svg+xml;base64,{b64encode(to_svg(figure, words).encode()).decode()}", words)

@@ -4,9 +4,11 @@ A job is one policy in a few worlds of a mission. Plain data go in and records c
 process or in any other.
 """
 
+import contextlib
+import itertools
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +20,7 @@ from hydrone_gym.evaluation.flight import fly, fly_worlds
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory, PolicySource, find_policies, told
 from hydrone_gym.evaluation.provenance import sources
 from hydrone_gym.evaluation.records import Key, Record, record_of
-from hydrone_gym.evaluation.suites import Mission, Suite, load_suite
+from hydrone_gym.evaluation.suites import Suite, load_suite
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.scenario import Scenario
 
@@ -30,7 +32,7 @@ PoliciesLike = str | Iterable[str] | Mapping[str, str | Factory]
 
 
 class BrokenOff(NamedTuple):
-    """A flight that could not be flown to its end because its policy raised."""
+    """A flight that ended early because its policy raised."""
 
     key: Key  # of the record it would have been
     reason: str  # the error in one line, with the place in the policy it came from
@@ -74,30 +76,26 @@ class Plan:
         for suite in self.suites:
             most = WORLDS_A_BATCH if suite.batch else WORLDS_A_JOB
             for mission in suite.missions:
-                for first in range(0, len(mission.scenarios), most):
-                    worlds = range(first, min(first + most, len(mission.scenarios)))
-                    yield from (self.job(suite, mission, policy, worlds) for policy in self.policies)
-
-    def job(self, suite: Suite, mission: Mission, policy: PolicySource, worlds: Iterable[int]) -> Job:
-        """Return the job of a policy in some worlds of a mission."""
-        return Job(
-            policy=policy,
-            seed=self.seed,
-            env_id=mission.env_id,
-            options={**mission.options, "vehicle": self.vehicle},
-            suite=suite.name,
-            mission=mission.name,
-            worlds=tuple((world, mission.scenarios[world]) for world in worlds),
-            batch=suite.batch,
-        )
+                worlds = tuple(enumerate(mission.scenarios))
+                parts = [worlds[first : first + most] for first in range(0, len(worlds), most)]
+                for part, policy in itertools.product(parts, self.policies):
+                    yield Job(
+                        policy=policy,
+                        seed=self.seed,
+                        env_id=mission.env_id,
+                        options={**mission.options, "vehicle": self.vehicle},
+                        suite=suite.name,
+                        mission=mission.name,
+                        worlds=part,
+                        batch=suite.batch,
+                    )
 
     def job_of(self, record: Record) -> Job:
         """Return the job that flies the world of a record again, alone; ValueError if the plan does not hold it."""
-        found = [(s, m) for s in self.suites for m in s.missions if (s.name, m.name) == (record.suite, record.mission)]
-        policies = [policy for policy in self.policies if policy.label == record.policy]
-        if not found or not policies or record.world >= len(found[0][1].scenarios):
-            raise ValueError(f"the plan does not hold {record.place}, policy {record.policy}")
-        return self.job(*found[0], policies[0], [record.world])
+        for job in self.jobs():
+            if record.key in job.keys:
+                return replace(job, worlds=(job.worlds[job.keys.index(record.key)],), batch=False)
+        raise ValueError(f"the plan does not hold {record.place}, policy {record.policy}")
 
     def keys(self) -> list[Key]:
         """The keys of all records, in the order of the rows."""
@@ -129,9 +127,8 @@ class Plan:
                     place = f"suite {job.suite}, mission {job.mission}, world {world} {scenario.name}".strip()
                     raise ValueError(f"{place}: {error}") from None
         for job in jobs[: len(self.policies)]:
-            env = job.make_env()
-            job.policy.make(env, job.seed)
-            warm_up(job, env)
+            job.policy.make(env := job.make_env(), job.seed)
+            _warm_up(job, env)
 
 
 def make_plan(
@@ -142,12 +139,7 @@ def make_plan(
     seed: int = 0,
     vehicle: str = "paper",
 ) -> Plan:
-    """Find suites and policies and check every argument; those of `evaluate`.
-
-    Raises:
-        ValueError: an argument out of range, two suites of one name, or a policy that is not known.
-        FileNotFoundError: no such suite or file.
-    """
+    """Find suites and policies and check every argument; arguments and errors are those of `evaluate`."""
     for name, number, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < least):
             raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
@@ -164,8 +156,7 @@ def make_plan(
 def plan_of(arguments: Mapping[str, Any]) -> Plan:
     """Find again what an evaluation flew, from the arguments in its summary.
 
-    Raises:
-        ValueError: a suite that is not what it was; FileNotFoundError: one that is not frozen and has no file here.
+    Raises ValueError for a suite that is not what it was, FileNotFoundError for one that is neither frozen nor here.
     """
     suites = []
     for name, fingerprint in arguments["suites"].items():
@@ -183,28 +174,24 @@ def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:
     Unless they are flown in a batch, every flight has a policy of its own, fresh from the factory, so a record depends
     on policy, seed and world alone, not on what else was flown in the same process.
     """
-    env, records = job.make_env(), list[Record]()
-    warm_up(job, env)
+    env, scenarios, records = job.make_env(), [scenario for _, scenario in job.worlds], list[Record]()
+    _warm_up(job, env)
     try:
         if job.batch:
-            return _fly_batch(job, env), None
-        for key, (_, scenario) in zip(job.keys, job.worlds, strict=True):
+            rows = gym.make_vec(job.env_id, len(scenarios), "vector_entry_point", **job.options)
+            endings = fly_worlds(rows, job.policy.make(env, job.seed), scenarios=scenarios)
+            return list(map(record_of, job.keys, endings)), None
+        for key, scenario in zip(job.keys, scenarios, strict=True):
             records.append(record_of(key, fly(env, job.policy.make(env, job.seed), scenario=scenario)))
     except Exception as error:  # whatever a user's policy may raise
         return records, BrokenOff(job.keys[len(records)], told(error), traceback.format_exc())
     return records, None
 
 
-def _fly_batch(job: Job, env: gym.Env) -> list[Record]:
-    rows = gym.make_vec(job.env_id, num_envs=len(job.worlds), vectorization_mode="vector_entry_point", **job.options)
-    endings = fly_worlds(rows, job.policy.make(env, job.seed), scenarios=[scenario for _, scenario in job.worlds])
-    return [record_of(key, ending) for key, ending in zip(job.keys, endings, strict=True)]
-
-
 _warm: set[tuple[str, str]] = set()  # label and origin of the policies that have decided in this process
 
 
-def warm_up(job: Job, env: gym.Env) -> None:
+def _warm_up(job: Job, env: gym.Env) -> None:
     """Let a policy decide once in this process before it is timed, which compiles its kernels or loads them.
 
     What it raises then it will raise again in the flight.
@@ -214,9 +201,7 @@ def warm_up(job: Job, env: gym.Env) -> None:
         return
     _warm.add(name)
     observation, _ = env.reset(options={"scenario": job.worlds[0][1]})
-    try:
+    with contextlib.suppress(Exception):
         policy = job.policy.make(env, job.seed)
         action, _ = policy.predict(observation, state=None, episode_start=np.array([True]), deterministic=True)
         env.step(action)
-    except Exception:
-        return

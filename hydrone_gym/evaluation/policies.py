@@ -9,6 +9,7 @@ what can be put around a policy, (policy, environment) -> policy, under `hydrone
 import importlib
 import importlib.util
 import inspect
+import operator
 import re
 import sys
 import traceback
@@ -18,6 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
@@ -56,8 +58,7 @@ class Policy(Protocol):
             episode_start: (n,) True where an episode begins, which resets that memory.
             deterministic: take the best action instead of drawing one.
 
-        Returns:
-            Actions (4,) or (n, 4) in m, m, m, rad, and the new state.
+        Actions are (4,) or (n, 4) in m, m, m, rad.
         """
         ...
 
@@ -76,10 +77,7 @@ class PolicySource:
     wrapper: str = ""  # "module:attribute" of what is put around the policy; empty for nothing
 
     def make(self, env: Any, seed: int) -> Policy:
-        """Return a new policy for an environment.
-
-        Raises ValueError naming the policy when its factory cannot be found, fails in any way, or makes no policy.
-        """
+        """Return a new policy; ValueError naming it if its factory cannot be found, fails in any way or makes none."""
         try:
             factory = load_factory(self.factory, self.search) if isinstance(self.factory, str) else self.factory
             arguments = (self.folder, env) if self.folder else (env,)
@@ -116,23 +114,18 @@ def known_policies() -> list[str]:
 def find_policy(text: str) -> PolicySource:
     """Find what a user means by a policy.
 
-    Args:
-        text: a registered name, "module:attribute", "path/file.py:attribute", or the folder of a trained agent, each
-            also as "LABEL=…" to call it otherwise, and as "…+shield" to put the shield, or another registered wrapper,
-            around it. Modules are sought in the current folder too.
+    It is a registered name, "module:attribute", "path/file.py:attribute", or the folder of a trained agent, each also
+    as "LABEL=…" to call it otherwise, and as "…+shield" to put the shield, or another registered wrapper, around it.
+    Modules are sought in the current folder too.
 
-    Raises:
-        ValueError: a name that is not registered, or a module or attribute that cannot be loaded; the message says why.
-        FileNotFoundError: a file that does not exist.
+    Raises ValueError saying why a policy cannot be found or loaded, FileNotFoundError for a file that does not exist.
     """
     before, _, after = text.partition("=")
     label, given = (before, after) if after and _LABEL.fullmatch(before) else (text, text)
     inner, plus, name = given.rpartition("+")
-    wrappers = [entry for entry in entry_points(group=_WRAPPERS) if plus and entry.name == name]
-    if wrappers:
+    if plus and (wrappers := entry_points(group=_WRAPPERS, name=name)):
         return replace(find_policy(inner), label=label, wrapper=_only(wrappers))
-    registered = [entry for entry in entry_points(group=_NAMES) if entry.name == given]
-    if registered:
+    if registered := entry_points(group=_NAMES, name=given):
         return PolicySource(label=label, factory=_only(registered))
     if Path(given).is_dir():
         return PolicySource(label=label, factory=_reader(Path(given)), folder=str(Path(given).resolve()))
@@ -150,10 +143,7 @@ def find_policy(text: str) -> PolicySource:
 
 
 def find_policies(policies: str | Iterable[str] | Mapping[str, str | Factory]) -> tuple[PolicySource, ...]:
-    """Find several policies; a mapping has labels as keys, and what `find_policy` takes or factories as values.
-
-    Raises ValueError for none, for a label twice, and as `find_policy` does.
-    """
+    """Find several policies; a mapping has labels as keys, and what `find_policy` takes or factories as values."""
     if isinstance(policies, Mapping):
         found = tuple(_labelled(label, value) for label, value in policies.items())
     else:
@@ -161,8 +151,7 @@ def find_policies(policies: str | Iterable[str] | Mapping[str, str | Factory]) -
     labels = [source.label for source in found]
     if not labels or not all(label.isprintable() for label in labels):
         raise ValueError(f"there must be at least one policy, and names without line breaks, got {labels}")
-    twice = sorted({label for label in labels if labels.count(label) > 1})
-    if twice:
+    if twice := sorted({label for label in labels if labels.count(label) > 1}):
         raise ValueError(f"policies must have different names, got {', '.join(twice)} twice: write LABEL=… before one")
     return found
 
@@ -173,62 +162,57 @@ def _labelled(label: str, value: str | Factory) -> PolicySource:
     return find_policy(f"{label}={value}") if isinstance(value, str) else PolicySource(label=label, factory=value)
 
 
-def _only(registered: list[EntryPoint]) -> str:
+def _only(registered: Iterable[EntryPoint]) -> str:
     """Return where the one entry point of a name leads; ValueError if packages disagree."""
     values = sorted({entry.value for entry in registered})
     if len(values) > 1:
-        raise ValueError(f"policy {registered[0].name!r} is registered by several packages: {', '.join(values)}")
+        name = next(iter(registered)).name
+        raise ValueError(f"policy {name!r} is registered by several packages: {', '.join(values)}")
     return values[0]
 
 
 def _reader(folder: Path) -> str:
     """Return where the reader of an agent's folder is found, chosen by the files in the folder."""
     readers = entry_points(group=_FOLDERS)
-    fitting = [entry for entry in readers if (folder / entry.name).is_file()]
-    if not fitting:
-        names = ", ".join(sorted({entry.name for entry in readers}))
-        raise ValueError(f"{folder}: not a trained agent: there must be a file {names}")
-    return _only(fitting)
+    if fitting := [entry for entry in readers if (folder / entry.name).is_file()]:
+        return _only(fitting)
+    raise ValueError(f"{folder}: not a trained agent: there must be a file {', '.join(sorted(readers.names))}")
 
 
 @cache
 def load_factory(path: str, search: str = "") -> Factory:
     """Import what "module:attribute" or "file.py:attribute" names; ValueError says what is missing.
 
-    A module of a user may fail in any way when it is imported; that way is named.
+    A module of a user may fail in any way when it is imported; that way is named. What lies beside a file can be
+    imported from it.
     """
     place, _, attribute = path.rpartition(":")
-    if place.endswith(".py") and not Path(place).is_file():
+    file = Path(place) if place.endswith(".py") else None
+    if file and not file.is_file():
         raise FileNotFoundError(f"policy {path!r}: there is no file {place}")
+    search = str(file.parent) if file else search
+    if search and search not in sys.path:
+        sys.path.append(search)  # last: a file of the user's must not stand in for an installed module
     try:
-        found: Any = _module_of(Path(place)) if place.endswith(".py") else _import(place, search)
+        module = _module_of(file) if file else importlib.import_module(place)
     except Exception as error:
         raise ValueError(f"policy {path!r} cannot be imported: {type(error).__name__}: {error}") from error
-    for name in attribute.split("."):
-        if not hasattr(found, name):
-            raise ValueError(f"policy {path!r}: {getattr(found, '__name__', found)!r} has no attribute {name!r}")
-        found = getattr(found, name)
+    try:
+        found: Any = operator.attrgetter(attribute)(module)
+    except AttributeError as error:
+        raise ValueError(f"policy {path!r}: {error}") from None
     if not callable(found):
         raise ValueError(f"policy {path!r} must be a callable that takes the environment, got {type(found).__name__}")
     return found
 
 
-def _import(module: str, search: str) -> Any:
-    if search and search not in sys.path:
-        sys.path.append(search)  # last: a file of the user's must not stand in for an installed module
-    return importlib.import_module(module)
-
-
-def _module_of(file: Path) -> Any:
-    """Run a file as a module; what lies beside it can be imported from it."""
+def _module_of(file: Path) -> ModuleType:
+    """Run a file as a module."""
     name = f"policy_{file.stem}_{zlib.crc32(str(file).encode()):08x}"
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses and pickle look it up there
-    if str(file.parent) not in sys.path:
-        sys.path.append(str(file.parent))
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)  # dataclasses and pickle look it up there
     spec.loader.exec_module(module)
     return module
 

@@ -1,7 +1,6 @@
 """What a figure means nothing without: versions, commit and machine."""
 
 import hashlib
-import os
 import platform
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
@@ -28,17 +27,17 @@ def versions(packages: tuple[str, ...] = PACKAGES) -> dict[str, str]:
 
 def commit() -> str | None:
     """Return the commit of the sources, with "+" when they differ from it; None outside a checkout of this project."""
-    git = ["git", "-C", str(_SOURCE)]
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(_SOURCE), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
     try:
-        # an installed copy may lie in somebody else's repository
-        subprocess.run([*git, "ls-files", "--error-unmatch", "__init__.py"], capture_output=True, check=True)
-        name = subprocess.run([*git, "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True)
-        parts = [f":/{part}" for part in _PARTS]
-        command = [*git, "status", "--porcelain", "--untracked-files=no", "--", *parts]
-        changes = subprocess.run(command, capture_output=True, text=True, check=True)
+        git("ls-files", "--error-unmatch", "__init__.py")  # an installed copy may lie in somebody else's repository
+        changes = git("status", "--porcelain", "--untracked-files=no", "--", *(f":/{part}" for part in _PARTS))
+        return git("rev-parse", "--short=12", "HEAD") + "+" * bool(changes)
     except (OSError, subprocess.CalledProcessError):
         return None
-    return name.stdout.strip() + ("+" if changes.stdout.strip() else "")
 
 
 def sources() -> str:
@@ -52,19 +51,11 @@ def sources() -> str:
 
 def machine() -> dict[str, Any]:
     """Return processor, cores this process may use, and system."""
-    return {"processor": _processor(), "cores": cores(), "system": f"{platform.system()} {platform.machine()}"}
+    import joblib
 
-
-def cores() -> int:
-    """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _processor() -> str:
     try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
+        named = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("model name")[2].partition("\n")[0]
     except OSError:
-        pass
-    return platform.processor() or platform.machine()
+        named = ""
+    processor = named.strip("\t: ") or platform.processor() or platform.machine()
+    return {"processor": processor, "cores": joblib.cpu_count(), "system": f"{platform.system()} {platform.machine()}"}

@@ -4,10 +4,10 @@ import csv
 import io
 import math
 import os
-from collections.abc import Callable
+import re
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from hydrone_gym.evaluation.flight import Ending
 from hydrone_gym.evaluation.statistics import percentiles
@@ -61,17 +61,23 @@ class Record:
 COLUMNS = tuple(field.name for field in fields(Record))
 TIMING = tuple(name for name in COLUMNS if name.startswith("decision_ms"))
 HEADER = ",".join(COLUMNS)
+# What a cell of a type must look like: a pattern, and the rule in words.
+_RULES: dict[Any, tuple[str, str]] = {
+    int: (r"[0-9]+", "a whole number"),
+    bool: (r"[01]", "0 or 1"),
+    float: (r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", "a number"),
+}
 
 
 def record_of(key: Key, flight: Ending) -> Record:
     """Sum up a flight."""
-    crossings = flight.transitions
-    speeds = ("lateral_speed", "tilt", "vertical_speed")
-    largest: dict[str, Any] = {
-        name: max((abs(float(crossing[name])) for crossing in crossings), default=None) for name in speeds
-    }
-    decisions: list[Any] = [value or 0.0 for value in percentiles(flight.decision_ms, (50.0, 99.0, 100.0))]
     suite, mission, world, policy = key
+    crossings = flight.transitions
+    largest: dict[str, Any] = {
+        name: max((abs(float(crossing[name])) for crossing in crossings), default=None)
+        for name in ("lateral_speed", "tilt", "vertical_speed")
+    }
+    p50, p99, longest = (value or 0.0 for value in percentiles(flight.decision_ms, (50.0, 99.0, 100.0)))
     return Record(
         suite=suite,
         mission=mission,
@@ -90,21 +96,17 @@ def record_of(key: Key, flight: Ending) -> Record:
         interventions=flight.interventions,
         episode_return=flight.episode_return,
         decisions=len(flight.decision_ms),
-        **dict(zip(TIMING, decisions, strict=True)),
+        decision_ms_p50=p50,
+        decision_ms_p99=p99,
+        decision_ms_max=longest,
     )
 
 
 def to_line(record: Record) -> str:
     """Return the line of CSV, line break included; floats in full, so that reading gives the same record."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerow(_cell(getattr(record, name)) for name in COLUMNS)
+    stream, cells = io.StringIO(), (getattr(record, name) for name in COLUMNS)
+    csv.writer(stream, lineterminator="\n").writerow(int(cell) if isinstance(cell, bool) else cell for cell in cells)
     return stream.getvalue()
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    return str(int(value)) if isinstance(value, bool) else str(value)  # str of a float restores it bit for bit
 
 
 def from_line(line: str) -> Record:
@@ -112,55 +114,30 @@ def from_line(line: str) -> Record:
     cells = next(csv.reader([line], strict=True), [])
     if len(cells) != len(COLUMNS):
         raise ValueError(f"there must be {len(COLUMNS)} cells, got {len(cells)}")
-    values = {}
-    for field, cell in zip(fields(Record), cells, strict=True):
-        try:
-            values[field.name] = _READERS[field.type](cell)
-        except ValueError as error:
-            raise ValueError(f"column {field.name}: {error}") from None
+    values = {field.name: _value(field.name, field.type, cell) for field, cell in zip(fields(Record), cells)}
     if values["outcome"] not in Outcome.__members__ or values["success"] != (values["outcome"] == Outcome.GOAL.name):
         raise ValueError(f"column outcome: {values['outcome']!r} does not fit success {int(values['success'])}")
     return Record(**values)
 
 
-def _number(kind: Callable[[str], Any], rule: Callable[[str], bool], words: str) -> Callable[[str], Any]:
-    """Return a reader of cells that obey a rule."""
-
-    def read(cell: str) -> Any:
-        if not rule(cell):
-            raise ValueError(f"must be {words}, got {cell!r}")
-        return kind(cell)
-
-    return read
-
-
-def _finite(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
-
-
-_WHOLE = _number(int, lambda cell: cell.isascii() and cell.isdigit(), "a whole number")
-_FLOAT = _number(float, _finite, "a number")
-_READERS: dict[Any, Any] = {
-    str: str,
-    int: _WHOLE,
-    bool: _number("1".__eq__, lambda cell: cell in ("0", "1"), "0 or 1"),
-    float: _FLOAT,
-    int | None: lambda cell: _WHOLE(cell) if cell else None,
-    float | None: lambda cell: _FLOAT(cell) if cell else None,
-}
+def _value(column: str, kind: Any, cell: str) -> Any:
+    """Return what a cell holds, given the type of its column; None for an empty one where the type allows it."""
+    if kind is str:
+        return cell
+    kind, *empty = get_args(kind) or (kind,)
+    if empty and not cell:
+        return None
+    pattern, rule = _RULES[kind]
+    number = float(cell) if re.fullmatch(pattern, cell) else math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"column {column}: must be {rule}, got {cell!r}")
+    return number if kind is float else kind(int(cell))
 
 
 def read_records(path: str | os.PathLike[str]) -> list[Record]:
-    """Read the rows that an evaluation wrote.
+    """Read the rows that an evaluation wrote, without a last line that was cut off when it was killed.
 
-    A last line without its line break, cut off when the evaluation was killed, is left out.
-
-    Raises:
-        ValueError: any other damage, naming file, line and column.
-        OSError: a file that cannot be read.
+    Raises ValueError for any other damage, naming file, line and column, and OSError for a file that cannot be read.
     """
     return parse_records(Path(path).read_bytes(), os.fspath(path))
 

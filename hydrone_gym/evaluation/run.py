@@ -11,7 +11,7 @@ from typing import Any
 from tqdm import tqdm
 
 from hydrone_gym.evaluation.backends import runner
-from hydrone_gym.evaluation.plan import BrokenOff, Plan, PoliciesLike, SuiteLike, fly_job, make_plan
+from hydrone_gym.evaluation.plan import Plan, PoliciesLike, SuiteLike, fly_job, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run_folder import RunFolder, write_results
@@ -73,15 +73,10 @@ def evaluate(
 def evaluate_held_out(
     policy: str | Factory, *, worlds: int = 1000, options: Mapping[str, Any] | None = None
 ) -> tuple[list[Record], list[dict[str, Any]]]:
-    """Fly a policy through worlds of every mission that training does not see, in batches.
+    """Fly a policy in batches through so many worlds of every mission that training does not see.
 
-    Args:
-        policy: as `find_policy` takes it, or a factory.
-        worlds: a mission.
-        options: keyword options of the environments, among them "vehicle" by its name.
-
-    Returns:
-        The records, and their scores (see `scores_of`).
+    `policy` is what `find_policy` takes, or a factory; `options` are those of the environments, among them "vehicle"
+    by its name. Returns the records, and their scores (see `scores_of`).
     """
     others = dict(options or {})
     vehicle = others.pop("vehicle", "paper")
@@ -97,14 +92,16 @@ def carry_out(
     backend: str | None = None,
     progress: bool = False,
 ) -> list[Record]:
-    """Fly what of a plan is not finished yet in a folder; arguments, result and errors as for `evaluate`.
-
-    `progress` shows a bar with the time left on stderr.
-    """
+    """Fly what of a plan is not finished yet in a folder, as `evaluate` does; `progress` shows a bar on stderr."""
     keys = plan.keys()
     records = [] if folder is None else folder.finished(keys)
     if len(records) == len(keys):
         return records
+
+    def stopped(reason: str) -> EvaluationStopped:
+        place = "" if folder is None else f" and kept in {folder.rows}; the same evaluation goes on from there"
+        return EvaluationStopped(f"{reason}; {len(records)} of {len(keys)} flights are finished{place}", records)
+
     plan.check()
     with (
         runner(backend, jobs) as run,
@@ -112,15 +109,23 @@ def carry_out(
         contextlib.closing(run(_calls(plan, len(records)))) as results,
     ):
         while len(records) < len(keys):
-            broken = _take(results, records, folder, len(keys))
-            bar.update(len(records) - bar.n)
+            try:
+                finished, broken = next(results)
+            except Exception as error:  # a backend's own: a worker killed, a cluster lost, a policy that cannot be sent
+                raise stopped(f"workers failed: {type(error).__name__}: {error}") from error
+            try:
+                if folder is not None:
+                    folder.append(finished)
+            except OSError as error:
+                raise stopped(str(error)) from error
+            records += finished
+            bar.update(len(finished))
             if broken is not None:
                 suite, mission, world, policy = broken.key
                 where = f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}"
-                kept = _kept(records, len(keys), folder)
-                stopped = EvaluationStopped(f"{where}: {broken.reason}; {kept}", records)
-                stopped.add_note(broken.details)
-                raise stopped
+                failed = stopped(f"{where}: {broken.reason}")
+                failed.add_note(broken.details)
+                raise failed
     return records
 
 
@@ -133,28 +138,3 @@ def _calls(plan: Plan, done: int) -> Iterator[Any]:
         done -= skipped
         if skipped < len(job.worlds):
             yield joblib.delayed(fly_job)(replace(job, worlds=job.worlds[skipped:]))
-
-
-def _take(results: Iterator[Any], records: list[Record], folder: RunFolder | None, total: int) -> BrokenOff | None:
-    """Add the rows of the next job to `records` and to the folder; return what cut the job short, None if nothing did.
-
-    Raises EvaluationStopped when the workers or the disk fail.
-    """
-    try:
-        finished, broken = next(results)
-    except Exception as error:  # a backend's own: a worker killed, a cluster lost, a policy that cannot be sent
-        kind = type(error).__name__
-        raise EvaluationStopped(f"workers failed: {kind}: {error}; {_kept(records, total, folder)}", records) from error
-    if folder is not None:
-        try:
-            folder.append(finished)
-        except OSError as error:
-            raise EvaluationStopped(f"{error}; {_kept(records, total, folder)}", records) from error
-    records += finished
-    return broken
-
-
-def _kept(records: list[Record], total: int, folder: RunFolder | None) -> str:
-    """Say what was finished."""
-    place = "" if folder is None else f" and kept in {folder.rows}; the same evaluation goes on from there"
-    return f"{len(records)} of {total} flights are finished{place}"

@@ -8,6 +8,7 @@
 """
 
 import dataclasses
+import itertools
 import json
 import os
 import time
@@ -31,16 +32,11 @@ _MAPPINGS = ("suites", "worlds", "policies", "versions", "machine")
 
 
 class RunFolder:
-    """Rows of an evaluation on disk.
+    """Rows of an evaluation in a folder, which is made if missing.
 
-    Args:
-        folder: made if missing.
-        arguments: what the rows depend on, as plain data.
-        overwrite: drop what another evaluation left there.
+    `arguments` are what the rows depend on, as plain data; `overwrite` drops what another evaluation left there.
 
-    Raises:
-        ValueError: the folder holds an evaluation with other arguments, or rows that are damaged.
-        OSError: a folder or file that cannot be made, read or written.
+    Raises ValueError for a folder with other arguments or damaged rows, OSError for what cannot be read or written.
     """
 
     def __init__(self, folder: Path, arguments: dict[str, Any], *, overwrite: bool = False) -> None:
@@ -67,13 +63,11 @@ class RunFolder:
             return []
         content = self.rows.read_bytes()
         records = parse_records(content, os.fspath(self.rows))
-        for number, record in enumerate(records):
-            if number >= len(keys) or record.key != keys[number]:
-                wanted = keys[number] if number < len(keys) else "the end of the file"
-                raise ValueError(f"{self.rows}, line {number + 2}: expected the row of {wanted}, got {record.key}")
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):
-            os.truncate(self.rows, whole)
+        expected = itertools.chain(keys, itertools.repeat("the end of the file"))
+        for line, (record, key) in enumerate(zip(records, expected), start=2):
+            if record.key != key:
+                raise ValueError(f"{self.rows}, line {line}: expected the row of {key}, got {record.key}")
+        os.truncate(self.rows, content.rfind(b"\n") + 1)
         return records
 
     def append(self, records: Sequence[Record]) -> None:
@@ -103,8 +97,7 @@ def write_results(
 ) -> tuple[dict[str, Any], list[Table]]:
     """Sum up the records of a plan, at least one, write `summary.json` and `tables.md`, and return what they hold.
 
-    `seconds` is the wall-clock time that this run took, s. Raises OSError for files that cannot be written, and what
-    `summarise` raises.
+    `seconds` is the wall-clock time that this run took, s.
     """
     summaries = summarise(records, baseline)
     document = {
@@ -118,7 +111,7 @@ def write_results(
         "seconds": seconds,
         "rows": len(records),
         "complete": len(records) == len(plan.keys()),
-        "missions": [_plain(dataclasses.asdict(summary)) for summary in summaries],
+        "missions": [dataclasses.asdict(summary, dict_factory=_plain) for summary in summaries],
     }
     tables = tables_of(summaries)
     _write_json(folder / SUMMARY, document)
@@ -126,13 +119,9 @@ def write_results(
     return document, tables
 
 
-def _plain(value: Any) -> Any:
-    """Turn estimates into dicts that name their parts, however deep."""
-    if isinstance(value, Estimate):
-        return value._asdict()
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
+def _plain(fields: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Make the dict of a dataclass, whose estimates name their parts too."""
+    return {name: value._asdict() if isinstance(value, Estimate) else value for name, value in fields}
 
 
 class Stored(NamedTuple):
@@ -141,25 +130,14 @@ class Stored(NamedTuple):
     document: Mapping[str, Any]  # the summary as plain data
     summaries: Sequence[MissionSummary]
     records: Sequence[Record]  # the rows, at least one
-
-    @property
-    def arguments(self) -> Mapping[str, Any]:
-        """What was asked for."""
-        arguments: Mapping[str, Any] = self.document["arguments"]
-        return arguments
-
-    @property
-    def policies(self) -> list[str]:
-        """The policies in the order in which they were given."""
-        return list(dict.fromkeys(record.policy for record in self.records))
+    arguments: Mapping[str, Any]  # what was asked for
+    policies: Sequence[str]  # in the order in which they were given
 
 
 def read_stored(folder: Path) -> Stored:
     """Read rows and summary of an evaluation, finished or not, and check them against each other.
 
-    Raises:
-        FileNotFoundError: one of them is missing.
-        ValueError: one of them is damaged, or they do not fit each other.
+    Raises FileNotFoundError if one of them is missing, ValueError if one is damaged or they do not fit each other.
     """
     for name in (ROWS, SUMMARY):
         if not (folder / name).is_file():
@@ -174,11 +152,10 @@ def read_stored(folder: Path) -> Stored:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: damaged: {type(error).__name__}: {error}") from None
     found = [(m.suite, m.mission, *sorted(p.policy for p in m.policies)) for m in summaries]
-    asked = set(arguments["suites"]), set(arguments["policies"])
-    flown = {record.suite for record in records}, {record.policy for record in records}
-    if document["rows"] != len(records) or summed != found or not (flown[0] <= asked[0] and flown[1] <= asked[1]):
+    asked = all(r.suite in arguments["suites"] and r.policy in arguments["policies"] for r in records)
+    if document["rows"] != len(records) or summed != found or not asked:
         raise ValueError(f"{folder}: {SUMMARY} does not sum up {ROWS}: run the evaluation once more")
-    return Stored(document, summaries, records)
+    return Stored(document, summaries, records, arguments, list(dict.fromkeys(record.policy for record in records)))
 
 
 def _check(document: Mapping[str, Any]) -> None:
@@ -187,8 +164,7 @@ def _check(document: Mapping[str, Any]) -> None:
     if found != (f"{FORMAT} summary", VERSION):
         raise ValueError(f"must be a {FORMAT} summary of version {VERSION}, got {found[0]!r}, version {found[1]!r}")
     parts = {**document["arguments"], **document}
-    missing = sorted(_PARTS - parts.keys())
-    if missing:
+    if missing := sorted(_PARTS - parts.keys()):
         raise ValueError(f"lacks {', '.join(missing)}")
     for name in _MAPPINGS:
         if not isinstance(parts[name], dict):

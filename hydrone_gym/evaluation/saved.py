@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.evaluation.flight import Flight, Trace
+from hydrone_gym.evaluation.flight import Flight, trace_of
 from hydrone_gym.evaluation.statistics import percentiles
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
+from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.scenario import Scenario
 
@@ -28,22 +28,17 @@ def flight_record(flight: Flight) -> dict[str, Any]:
     Every number is finite; what is not, such as the clearance in a world without obstacles, is None.
     """
     p50, p99 = percentiles(flight.decision_ms, (50.0, 99.0))
-    record = {
-        "scenario": {name: getattr(flight.scenario, name) for name in ("name", "start", "goal", "obstacles")},
-        "outcome": flight.outcome.name,
-        "success": flight.outcome is Outcome.GOAL,
-        "time": flight.time,
-        "transitions": flight.transitions,
-        "clearance": flight.clearance,
-        "length": flight.length,
-        "energy": flight.energy,
-        "episode_return": flight.episode_return,
-        "planning_ms": {"p50": p50, "p99": p99},
-        "references": flight.references,
-        "states": flight.states,
-        "detected": flight.detected,
-    }
-    return {name: plain(value) for name, value in record.items()}
+    measured = ("time", "transitions", "clearance", "length", "energy", "episode_return")
+    return plain(
+        {
+            "scenario": {name: getattr(flight.scenario, name) for name in ("name", "start", "goal", "obstacles")},
+            "outcome": flight.outcome.name,
+            "success": flight.outcome is Outcome.GOAL,
+            **{name: getattr(flight, name) for name in measured},
+            "planning_ms": {"p50": p50, "p99": p99},
+            **{name: getattr(flight, name) for name in ("references", "states", "detected")},
+        }
+    )
 
 
 def plain(value: Any) -> Any:
@@ -77,9 +72,7 @@ class SavedFlight:
 def read_flights(path: str | Path) -> list[SavedFlight]:
     """Read the flights that `hydrone fly` saved in its flight.json.
 
-    Raises:
-        ValueError: another kind of file or a damaged one, naming the file and what is wrong.
-        OSError: a file that cannot be read.
+    Raises ValueError for another kind of file or a damaged one, naming the file and what is wrong.
     """
     content = Path(path).read_bytes()
     try:
@@ -91,10 +84,9 @@ def read_flights(path: str | Path) -> list[SavedFlight]:
         raise ValueError(f'{path}: must be a file "{FORMAT}" of version {VERSION}, got {found[0]!r}, {found[1]!r}')
     try:
         flights = [_flight(record, document) for record in document["flights"]]
-    except KeyError as error:
-        raise ValueError(f"{path}: damaged: lacks {error}") from None
-    except (ValueError, TypeError, AttributeError) as error:
-        raise ValueError(f"{path}: damaged: {error}") from None
+    except (KeyError, ValueError, TypeError, AttributeError) as error:
+        lacks = "lacks " if isinstance(error, KeyError) else ""
+        raise ValueError(f"{path}: damaged: {lacks}{error}") from None
     if not flights:
         raise ValueError(f"{path}: holds no flight")
     return flights
@@ -102,8 +94,8 @@ def read_flights(path: str | Path) -> list[SavedFlight]:
 
 def _flight(record: dict[str, Any], document: dict[str, Any]) -> SavedFlight:
     """Turn one record into a flight; any error says what is wrong with it."""
-    references = _table("references", record["references"], 4)
-    states = _table("states", record["states"], 12)
+    references = _rows("references", record["references"], 4)
+    states = _rows("states", record["states"], 12)
     if not len(references) or len(states) != len(references) + 1:
         raise ValueError(f"there must be one state more than references, got {len(states)} and {len(references)}")
     if record["outcome"] not in Outcome.__members__:
@@ -117,12 +109,12 @@ def _flight(record: dict[str, Any], document: dict[str, Any]) -> SavedFlight:
         scenario=Scenario(**record["scenario"]),
         references=references,
         states=states,
-        detected=_table("detected", record["detected"], 4),
+        detected=_rows("detected", record["detected"], 4),
         record={**record, **{name: float(record[name]) for name in ("time", "energy", "length", "episode_return")}},
     )
 
 
-def _table(name: str, rows: Any, width: int) -> NDArray[np.float64]:
+def _rows(name: str, rows: Any, width: int) -> NDArray[np.float64]:
     """Return rows of finite numbers; ValueError for anything else."""
     table = np.array(rows, dtype=np.float64).reshape((-1, width) if not rows else np.shape(rows))
     if table.ndim != 2 or table.shape[1] != width or not np.isfinite(table).all():
@@ -133,20 +125,14 @@ def _table(name: str, rows: Any, width: int) -> NDArray[np.float64]:
 def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
     """Fly the references of a saved flight again, tick by tick: the same kernel, so the same flight bit for bit.
 
-    Args:
-        saved: from `read_flights`.
-        simulation: of an environment with its vehicle and otherwise the defaults, which `hydrone fly` uses.
+    `simulation` is that of an environment with the flight's vehicle and otherwise the defaults, which `hydrone fly`
+    uses. Times of decisions and interventions of a shield are not saved and stay empty.
 
-    Returns:
-        The flight; times of decisions and interventions of a shield are not saved and stay empty.
-
-    Raises:
-        ValueError: the references lead elsewhere, as with another version of the model.
+    Raises ValueError for references that lead elsewhere, as with another version of the model.
     """
-    goal, obstacles = np.array(saved.scenario.goal), saved.scenario.obstacles
-    times, states, moving, _ = trajectory(simulation, row_at(saved.states[0], goal), saved.references, obstacles)
-    last, ends = len(times) - 1, simulation.ticks * np.arange(len(saved.states))
-    apart = float(np.abs(states[np.minimum(ends, last)] - saved.states).max())
+    trace = trace_of(simulation, saved.scenario, saved.states[0], saved.references)
+    last, ends = len(trace.times) - 1, simulation.ticks * np.arange(len(saved.states))
+    apart = float(np.abs(trace.states[np.minimum(ends, last)] - saved.states).max())
     if not ends[-2] < last <= ends[-1] or apart > _SAME:
         raise ValueError(
             f"{saved.name}: its references no longer lead where they led, {apart:.2g} (m, rad, m/s) apart: "
@@ -154,7 +140,7 @@ def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
         )
     record, clearance = saved.record, saved.record["clearance"]
     return Flight(
-        obstacles=len(obstacles),
+        obstacles=len(saved.scenario.obstacles),
         scenario=saved.scenario,
         outcome=Outcome[record["outcome"]],
         clearance=np.inf if clearance is None else float(clearance),
@@ -164,5 +150,5 @@ def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
         detected=saved.detected,
         decision_ms=np.zeros(0),
         interventions=None,
-        trace=Trace(times, states, moving),
+        trace=trace,
     )

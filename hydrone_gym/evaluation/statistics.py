@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,37 +22,28 @@ class Estimate(NamedTuple):
 
 
 class PairedSuccess(NamedTuple):
-    """How two policies fared on the same worlds.
+    """How two policies fared on the same worlds."""
 
-    `difference` of the success rates with its interval; `only_first` and `only_second` worlds that one alone solved;
-    `p_value` of McNemar's exact test of no difference, two-sided.
-    """
-
-    difference: Estimate
-    only_first: int
+    difference: Estimate  #: of the success rates
+    only_first: int  #: worlds that the first alone solved
     only_second: int
-    p_value: float
+    p_value: float  #: of McNemar's exact test of no difference, two-sided
 
 
 def percentiles(values: ArrayLike, shares: Sequence[float]) -> list[float | None]:
     """Return percentiles of values at shares in percent, interpolated linearly; None for each if there is no value."""
     numbers = np.asarray(values, dtype=np.float64)
-    if numbers.size == 0:
-        return [None] * len(shares)
-    return np.percentile(numbers, shares).tolist()
+    return np.percentile(numbers, shares).tolist() if numbers.size else [None] * len(shares)
 
 
 def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the Wilson score interval of a success rate, which holds near 0 and 1 too.
-
-    Raises ValueError for no trials, or more successes than trials.
-    """
+    """Return the Wilson score interval of a success rate, which holds near 0 and 1 too; ValueError for no such rate."""
     if not 0 <= successes <= trials or trials < 1:
         raise ValueError(f"successes must lie between 0 and the number of trials, got {successes} of {trials}")
     from scipy.stats import binomtest  # a second to import
 
-    interval = binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    return float(interval.low), float(interval.high)
+    low, high = binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return float(low), float(high)
 
 
 def interquartile_mean(values: ArrayLike, confidence: float = 0.95) -> Estimate:
@@ -71,35 +63,17 @@ def interquartile_mean(values: ArrayLike, confidence: float = 0.95) -> Estimate:
     if numbers.size < 2 or np.ptp(numbers) == 0.0:
         end = value if numbers.size > 1 else None
         return Estimate(value, end, end)
-
-    def statistic(sample: np.ndarray, axis: int) -> np.ndarray:
-        return trim_mean(sample, _TRIMMED, axis=axis)
-
-    interval = bootstrap(
-        (numbers,),
-        statistic,
-        n_resamples=RESAMPLES,
-        batch=max(1, _AT_ONCE // numbers.size),
-        confidence_level=confidence,
-        method="percentile",
-        vectorized=True,
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return Estimate(value, float(interval.low), float(interval.high))
+    options = {"n_resamples": RESAMPLES, "batch": max(1, _AT_ONCE // numbers.size), "rng": np.random.default_rng(0)}
+    statistic = partial(trim_mean, proportiontocut=_TRIMMED)
+    resampled = bootstrap((numbers,), statistic, confidence_level=confidence, method="percentile", **options)
+    return Estimate(value, *map(float, resampled.confidence_interval))
 
 
 def paired_success(first: ArrayLike, second: ArrayLike, confidence: float = 0.95) -> PairedSuccess:
-    """Compare two policies by which of the same worlds they solved.
+    """Compare two policies by which of the same worlds they solved, (n,) each; ValueError for no pairs.
 
     The interval is Newcombe's for paired proportions, made of two Wilson intervals and the correlation of the pairs
     (Statistics in Medicine 17, 2635-2650, 1998, method 10); it holds where rates are 0 or 1 too.
-
-    Args:
-        first, second: (n,) whether each world was solved.
-        confidence: of the interval.
-
-    Raises:
-        ValueError: no worlds, or different numbers of them.
     """
     one, two = np.asarray(first, bool), np.asarray(second, bool)
     if one.shape != two.shape or one.ndim != 1 or not one.size:
@@ -108,11 +82,15 @@ def paired_success(first: ArrayLike, second: ArrayLike, confidence: float = 0.95
 
     n, both = one.size, int((one & two).sum())
     only_first, only_second = int((one & ~two).sum()), int((two & ~one).sum())
-    neither = n - both - only_first - only_second
-    p1, p2 = (both + only_first) / n, (both + only_second) / n
-    low1, high1 = wilson_interval(both + only_first, n, confidence)
-    low2, high2 = wilson_interval(both + only_second, n, confidence)
-    phi = _correlation(both, only_first, only_second, neither)
+    solved1, solved2 = both + only_first, both + only_second
+    p1, p2 = solved1 / n, solved2 / n
+    low1, high1 = wilson_interval(solved1, n, confidence)
+    low2, high2 = wilson_interval(solved2, n, confidence)
+    margins = math.prod((solved1, n - solved1, solved2, n - solved2))
+    covariance = float(n * both - solved1 * solved2)
+    if covariance > 0.0:  # Newcombe's correction for continuity
+        covariance = max(covariance - n / 2.0, 0.0)
+    phi = covariance / math.sqrt(margins) if margins else 0.0
 
     def reach(a: float, b: float) -> float:
         return math.sqrt(max(a * a - 2.0 * phi * a * b + b * b, 0.0))
@@ -122,14 +100,3 @@ def paired_success(first: ArrayLike, second: ArrayLike, confidence: float = 0.95
     discordant = only_first + only_second
     p_value = float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
     return PairedSuccess(Estimate(difference, low, high), only_first, only_second, p_value)
-
-
-def _correlation(both: int, only_first: int, only_second: int, neither: int) -> float:
-    """Return the correlation of paired outcomes, with Newcombe's continuity correction where it is positive."""
-    margins = math.prod((both + only_first, only_second + neither, both + only_second, only_first + neither))
-    if margins == 0:
-        return 0.0
-    covariance = float(both * neither - only_first * only_second)
-    if covariance > 0.0:
-        covariance = max(covariance - (both + only_first + only_second + neither) / 2.0, 0.0)
-    return covariance / math.sqrt(margins)

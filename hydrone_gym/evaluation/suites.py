@@ -31,16 +31,11 @@ _PARTS = ("start", "goal", "obstacles")
 
 @dataclass(frozen=True, kw_only=True)
 class Mission:
-    """Scenarios of one kind and the environment they are flown in.
-
-    Raises:
-        ValueError: no scenario, or an option that belongs to the evaluation.
-    """
+    """Scenarios of one kind and the environment they are flown in; ValueError for none, or an option not its own."""
 
     name: str  #: what tables call it
     env_id: str  #: registered id of the environment
-    #: keyword options of that environment, plain data; "vehicle" and "interface" are not among them
-    options: Mapping[str, Any]
+    options: Mapping[str, Any]  #: of that environment, plain data, without "vehicle" and "interface"
     scenarios: tuple[Scenario, ...]  #: the worlds; world k of the mission is entry k
 
     def __post_init__(self) -> None:
@@ -54,11 +49,7 @@ class Mission:
 
 @dataclass(frozen=True, kw_only=True)
 class Suite:
-    """Missions under one name.
-
-    Raises:
-        ValueError: no mission, or two of one name.
-    """
+    """Missions under one name; ValueError for none, or two of one name."""
 
     name: str  #: what tables call it, for a frozen suite with its version
     missions: tuple[Mission, ...]  #: each with a name of its own
@@ -74,13 +65,9 @@ class Suite:
     def drawn(
         cls, env_id: str, seeds: Iterable[int], options: Mapping[str, Any] | None = None, *, name: str = "drawn"
     ) -> Self:
-        """Return a suite of one mission: the worlds that an environment draws from these seeds.
+        """Return a suite of one mission, called by its environment's id: the worlds that it draws from these seeds.
 
-        Args:
-            env_id: registered id.
-            seeds: one a world. Training uses seeds below `HELD_OUT`.
-            options: keyword options of the environment.
-            name: of the suite; the mission is called by the environment's id.
+        Training uses seeds below `HELD_OUT`; `options` are keyword options of the environment.
         """
         import gymnasium as gym
 
@@ -134,26 +121,22 @@ def load_suite(name_or_path: str | os.PathLike[str], worlds: int | None = None) 
         ValueError: a damaged file, or a folder without scenarios.
     """
     name, path = os.fspath(name_or_path), Path(name_or_path)
-    versions = [frozen for frozen in frozen_suites() if name in (frozen, frozen.rpartition("-v")[0])]
-    if versions:
+    if versions := [frozen for frozen in SHA256 if name in (frozen, frozen.rpartition("-v")[0])]:
         newest = max(versions, key=lambda frozen: int(frozen.rpartition("-v")[2]))
         path = FOLDER / f"{newest}.npz"
         found = hashlib.sha256(path.read_bytes()).hexdigest()
         if found != SHA256[newest]:
             raise ValueError(f"{path}: the frozen suite is damaged, its SHA-256 is {found}, not {SHA256[newest]}")
         return _read(path)
-    held_out = _HELD_OUT.fullmatch(name)
-    if held_out:
+    if held_out := _HELD_OUT.fullmatch(name):
         count, low, high = held_out.groups()
-        options = {} if count is None else {"num_obstacles": int(count)}
-        radii = {} if low is None else {"obstacle_radius": (float(low), float(high))}
-        return Suite.held_out(1000 if worlds is None else worlds, options | radii, name=name)
-    if path.is_dir():
-        return _from_folder(path)
-    if path.is_file():
-        return _read(path)
-    frozen = ", ".join(frozen_suites())
-    raise FileNotFoundError(f"no suite {name!r}: frozen are {frozen}; or give held-out, a file or a folder")
+        options: dict[str, Any] = {} if count is None else {"num_obstacles": int(count)}
+        options |= {} if low is None else {"obstacle_radius": (float(low), float(high))}
+        return Suite.held_out(1000 if worlds is None else worlds, options, name=name)
+    if not path.exists():
+        frozen = ", ".join(frozen_suites())
+        raise FileNotFoundError(f"no suite {name!r}: frozen are {frozen}; or give held-out, a file or a folder")
+    return _from_folder(path) if path.is_dir() else _read(path)
 
 
 def _from_folder(folder: Path) -> Suite:
@@ -176,13 +159,12 @@ def save_suite(suite: Suite, path: str | os.PathLike[str]) -> None:
     Raises ValueError where scenarios of one mission have different numbers of spheres, OSError if writing fails.
     """
     arrays: dict[str, NDArray] = {}
-    described = []
     for mission in suite.missions:
-        described.append({"name": mission.name, "env_id": mission.env_id, "options": dict(mission.options)})
         if len({len(scenario.obstacles) for scenario in mission.scenarios}) > 1:
             raise ValueError(f"scenarios of mission {mission.name!r} must have equally many spheres to be saved")
         for part in _PARTS:
             arrays[f"{mission.name}/{part}"] = np.array([getattr(scenario, part) for scenario in mission.scenarios])
+    described = [{"name": m.name, "env_id": m.env_id, "options": dict(m.options)} for m in suite.missions]
     arrays["suite"] = np.array(json.dumps({"name": suite.name, "missions": described}))
     with open(path, "wb") as stream:
         np.savez(stream, allow_pickle=False, **arrays)
@@ -196,8 +178,8 @@ def _read(path: Path) -> Suite:
             missions = []
             for described in content["missions"]:
                 columns = (arrays[f"{described['name']}/{part}"] for part in _PARTS)
-                scenarios = tuple(Scenario(**dict(zip(_PARTS, row, strict=True))) for row in zip(*columns, strict=True))
-                missions.append(Mission(**described, scenarios=scenarios))
+                scenarios = (Scenario(start=s, goal=g, obstacles=o) for s, g, o in zip(*columns, strict=True))
+                missions.append(Mission(**described, scenarios=tuple(scenarios)))
             return Suite(name=content["name"], missions=tuple(missions))
     except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path}: not a suite file: {error}") from None

@@ -1,5 +1,6 @@
 """An evaluation in numbers: each policy on each mission, ranked, and how it differs from a baseline on equal worlds."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -65,17 +66,9 @@ class MissionSummary:
 
 
 def summarise(records: Sequence[Record], baseline: str | None = None) -> list[MissionSummary]:
-    """Sum up an evaluation, finished or not.
+    """Sum up an evaluation, finished or not: for each suite its missions, then all of them together if there are more.
 
-    Args:
-        records: in any order.
-        baseline: policy to compare with; unless given `BASELINE` if it flew, else the first one of the records.
-
-    Returns:
-        For each suite its missions in the order of the records, then all of them together if they are several.
-
-    Raises:
-        ValueError: a baseline that is not among the policies.
+    The `baseline` is `BASELINE` unless given, if it flew, else the first policy; ValueError for one that did not fly.
     """
     policies = list(dict.fromkeys(record.policy for record in records))
     if baseline is not None and baseline not in policies:
@@ -93,21 +86,17 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
 
 
 def scores_of(records: Sequence[Record]) -> list[dict[str, Any]]:
-    """Return how the flights of each mission ended, in short: plain data, with means in s and J of those that arrived.
-
-    Args:
-        records: of one policy.
-    """
+    """Return how a policy's flights of each mission ended: plain data, with means in s and J of those that arrived."""
     scores = []
     for mission in dict.fromkeys(record.mission for record in records):
         flown = [record for record in records if record.mission == mission]
         arrived = [record for record in flown if record.success]
-        ends = [record.outcome for record in flown]
+        ends = Counter(record.outcome for record in flown)
         scores.append(
             {
                 "mission": mission,
                 "episodes": len(flown),
-                "outcomes": {kind.name: ends.count(kind.name) for kind in Outcome if kind.name in ends},
+                "outcomes": {kind.name: ends[kind.name] for kind in Outcome if ends[kind.name]},
                 "success": len(arrived) / len(flown),
                 "interval": wilson_interval(len(arrived), len(flown)),
                 "time": float(np.mean([record.time for record in arrived])) if arrived else None,
@@ -126,19 +115,15 @@ def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str)
     for name in [p.policy for p in summed if p.policy != baseline]:
         pairs = [(r, compared[r.mission, r.world]) for r in flown[name] if (r.mission, r.world) in compared]
         comparisons += [_comparison(name, pairs)] if pairs else []
+    ranked = tuple(replace(entry, rank=rank) for rank, entry in enumerate(summed, start=1))
     return MissionSummary(
-        suite=suite,
-        mission=mission,
-        baseline=baseline,
-        policies=tuple(replace(entry, rank=rank) for rank, entry in enumerate(summed, start=1)),
-        comparisons=tuple(comparisons),
+        suite=suite, mission=mission, baseline=baseline, policies=ranked, comparisons=tuple(comparisons)
     )
 
 
 def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
     arrived = [record for record in records if record.success]
-    low, high = wilson_interval(len(arrived), len(records))
-    outcomes = [record.outcome for record in records]
+    ends = Counter(record.outcome for record in records)
 
     def there(name: str, among: Sequence[Record] = records) -> list[float]:
         return [getattr(r, name) for r in among if getattr(r, name) is not None]
@@ -148,12 +133,12 @@ def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
         policy=name,
         rank=0,
         worlds=len(records),
-        success=Estimate(len(arrived) / len(records), low, high),
-        collisions=outcomes.count(Outcome.COLLISION.name),
-        rough_crossings=outcomes.count(Outcome.ROUGH_TRANSITION.name),
-        timeouts=outcomes.count(Outcome.TIMEOUT.name),
-        out_of_bounds=outcomes.count(Outcome.OUT_OF_BOUNDS.name),
-        diverged=outcomes.count(Outcome.DIVERGED.name),
+        success=Estimate(len(arrived) / len(records), *wilson_interval(len(arrived), len(records))),
+        collisions=ends["COLLISION"],
+        rough_crossings=ends["ROUGH_TRANSITION"],
+        timeouts=ends["TIMEOUT"],
+        out_of_bounds=ends["OUT_OF_BOUNDS"],
+        diverged=ends["DIVERGED"],
         time=_estimate(there("time", arrived)),
         length=_estimate(there("length", arrived)),
         energy=_estimate(there("energy", arrived)),

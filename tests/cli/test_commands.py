@@ -85,7 +85,7 @@ def test_help_needs_neither_torch_nor_kernels():
 KERNEL = """
 import sys
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym.cli.compiling import tell_compiling
+from hydrone_gym.cli import tell_compiling
 
 @inlined
 def twice(x):

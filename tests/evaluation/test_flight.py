@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hydrone_gym.evaluation import fly
-from hydrone_gym.evaluation.attitude import attitude_references
+from hydrone_gym.evaluation.flight_figures import attitude_references
 from hydrone_gym.simulation.outcome import Outcome
 from planners import CLRRT, StraightLine
 
