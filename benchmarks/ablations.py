@@ -17,7 +17,7 @@ def without_verified_stop(env: Any) -> CLRRT:
 
 def without_replay(env: Any) -> CLRRT:
     """A path is sent as it was grown, not propagated again from the state observed now."""
-    return CLRRT.for_env(env, settings=CLRRTSettings(replay=False))
+    return CLRRT.for_env(env, settings=CLRRTSettings(re_propagate=False))
 
 
 def without_margins(env: Any) -> CLRRT:
@@ -27,4 +27,4 @@ def without_margins(env: Any) -> CLRRT:
 
 def with_none(env: Any) -> CLRRT:
     """None of the three."""
-    return CLRRT.for_env(env, settings=CLRRTSettings(verify=False, replay=False, margin=0.0, rest_margin=0.0))
+    return CLRRT.for_env(env, settings=CLRRTSettings(verify=False, re_propagate=False, margin=0.0, rest_margin=0.0))

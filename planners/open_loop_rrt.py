@@ -22,7 +22,7 @@ _CRUISE = 0.8  # share of the limit speeds at which the reference moves
 _AT_GATE = (0.45, 0.15)  # m and m/s: how near and how slow before the reference crosses
 
 
-class Track(NamedTuple):
+class Route(NamedTuple):
     """What one environment's planner remembers; never changed once returned."""
 
     path: NDArray[np.float64]  # (n, 3) corners in m; empty if none was found
@@ -77,9 +77,9 @@ class OpenLoopRRT(PlannerPolicy):
         self._water_speed = _CRUISE * np.array([limits.surge, limits.dive])
         self._zone_speed = _CRUISE * limits.zone
 
-    def act(self, now: Known, memory: Track | None) -> tuple[NDArray[np.float64], Track]:
+    def act(self, now: Known, memory: Route | None) -> tuple[NDArray[np.float64], Route]:
         """Return the reference (4,) for the next period (m, m, m, rad) and the memory."""
-        track = Track(np.zeros((0, 3)), 0.0, 0, 0) if memory is None else memory
+        track = Route(np.zeros((0, 3)), 0.0, 0, 0) if memory is None else memory
         position, count = now.state[:3], len(now.obstacles)
         path, progress = track.path, track.progress
         if not len(path) or (count > track.known and self._blocked(path, progress, now.obstacles)):
@@ -88,9 +88,9 @@ class OpenLoopRRT(PlannerPolicy):
         psi = now.reference[3] if in_air(position[2]) else now.state[5]
         if not len(path):
             still = position + self._ahead[bool(in_air(position[2]))] * now.state[6:9]
-            return np.append(still, psi), Track(path, 0.0, count, track.cycle + 1)
+            return np.append(still, psi), Route(path, 0.0, count, track.cycle + 1)
         progress, point = self._move(path, progress, now.state)
-        return np.append(point, psi), Track(path, progress, count, track.cycle + 1)
+        return np.append(point, psi), Route(path, progress, count, track.cycle + 1)
 
     def plan(self, now: Known, random: np.random.Generator) -> NDArray[np.float64]:
         """Return the corners (n, 3) of a path from the vehicle to the goal, (0, 3) if none was found."""

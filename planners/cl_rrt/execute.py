@@ -201,7 +201,7 @@ def choose(p, size):
         end = best_node(p, size)
         if end < 0:
             break
-        first = re_propagate(p, end) if p.settings.replay > 0.0 else first_of(p, end)
+        first = re_propagate(p, end) if p.settings.re_propagate > 0.0 else first_of(p, end)
         if first < 0:
             p.nodes[-first].dead = 1
             prune_orphans(p, size)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from planners.stop_check import MARGIN
 
-_SWITCHES = ("replay", "verify")
+_SWITCHES = ("re_propagate", "verify")
 
 
 class SettingParams(NamedTuple):
@@ -20,7 +20,7 @@ class SettingParams(NamedTuple):
     rest_margin: float
     tries: float
     extension: float
-    replay: float  # 1: paths are propagated again before their first edge is sent
+    re_propagate: float  # 1: paths are propagated again before their first edge is sent
     verify: float  # 1: an edge is sent only if it was seen to be followed by a stop
     step: float  # m an edge in air may move its reference: the safe speed times the period
     prune: float  # 1: samples that cannot beat the best path are dropped
@@ -39,7 +39,7 @@ class CLRRTSettings:
         tries: nodes tried in sorted order for one sample.
         extension: longest extension toward one sample, edges.
         max_nodes: size of the tree.
-        replay: whether the path chosen is propagated again against what is known now; False only to see what it is for.
+        re_propagate: whether the path chosen is propagated again against what is known now; False only to see what it is for.
         verify: whether an edge must be seen to be followed by a stop; False only to see what it is for.
 
     Raises:
@@ -54,7 +54,7 @@ class CLRRTSettings:
     tries: int = 3
     extension: int = 12
     max_nodes: int = 2000
-    replay: bool = True
+    re_propagate: bool = True
     verify: bool = True
 
     def __post_init__(self) -> None:
