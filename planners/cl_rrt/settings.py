@@ -39,7 +39,7 @@ class CLRRTSettings:
         tries: nodes tried in sorted order for one sample.
         extension: longest extension toward one sample, edges.
         max_nodes: size of the tree.
-        re_propagate: whether the path chosen is propagated again against what is known now; False only to see what it is for.
+        re_propagate: whether the path chosen is propagated again before it is sent; False only to see what that is for.
         verify: whether an edge must be seen to be followed by a stop; False only to see what it is for.
 
     Raises:
