@@ -6,6 +6,7 @@ such a route is searched with a flood fill over a coarse grid.
 """
 
 import functools
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -28,63 +29,51 @@ MEDIA = ("air", "water")
 class ScenarioLaw:
     """What random scenarios are drawn by (paper, Sec. 4: spheres randomly distributed between two ends).
 
-    Attributes:
-        num_obstacles: number of spheres; centres are uniform in the box, above and under water alike.
-        obstacle_radius: least and greatest radius in m, uniform in between.
-        end_clearance: distance in m, beyond the vehicle's radius, that every sphere's surface keeps to start and goal.
-        start, goal: fixed ends (x, y, z in m) with null yaw, or None to draw them; a drawn start has any yaw.
-        min_separation: least distance in m between start and goal where at least one of them is drawn.
-        media: medium of start and goal, each "air" or "water"; None tosses a fair coin for each drawn end.
-
-    Raises:
-        ValueError: a value out of range, named with its unit.
+    Raises ValueError for a value out of range, named with its unit.
     """
 
-    num_obstacles: int = 20
-    obstacle_radius: tuple[float, float] = (0.5, 1.5)
-    end_clearance: float = 1.0
-    start: tuple[float, float, float] | None = None
-    goal: tuple[float, float, float] | None = None
-    min_separation: float = 8.0
-    media: tuple[str, str] | None = None
+    num_obstacles: int = 20  # spheres; their centres are uniform in the box, above and under water alike
+    obstacle_radius: tuple[float, float] = (0.5, 1.5)  # m, least and greatest, uniform in between
+    end_clearance: float = 1.0  # m, beyond the vehicle's radius, that every sphere's surface keeps to start and goal
+    start: tuple[float, float, float] | None = None  # m, with null yaw; None to draw it, with any yaw
+    goal: tuple[float, float, float] | None = None  # m; None to draw it
+    min_separation: float = 8.0  # m between start and goal, at least, where one of them is drawn
+    media: tuple[str, str] | None = None  # of start and goal, of `MEDIA`; None: a fair coin for each drawn end
 
     def __post_init__(self) -> None:
-        """Check every field as far as no world is needed; lists become tuples."""
-        count = self.num_obstacles
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
-            raise ValueError(f"ScenarioLaw.num_obstacles must be a whole number, not negative, got {count!r}")
-        radius = self._numbers("obstacle_radius", 2)
-        if not 0.0 < radius[0] <= radius[1]:
-            raise ValueError(f"ScenarioLaw.obstacle_radius must be positive and ascending (m), got {radius!r}")
+        """Check every field as far as no world is needed; lists become tuples, so that the law stays hashable."""
+        count, radius, media = self.num_obstacles, self.obstacle_radius, self.media
+        whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+        self._must(whole and count >= 0, "num_obstacles", "a whole number, not negative")
+        self._must(_are_numbers(radius, 2), "obstacle_radius", "2 finite numbers (m)")
+        self._must(0.0 < radius[0] <= radius[1], "obstacle_radius", "positive and ascending (m)")
         for name in ("end_clearance", "min_separation"):
             value = getattr(self, name)
-            if not _is_number(value) or value < 0.0:
-                raise ValueError(f"ScenarioLaw.{name} must be finite and not negative (m), got {value!r}")
+            self._must(_are_numbers((value,), 1) and value >= 0.0, name, "finite and not negative (m)")
         for name in ("start", "goal"):
+            self._must(
+                getattr(self, name) is None or _are_numbers(getattr(self, name), 3), name, "3 finite numbers (m)"
+            )
+        pair = isinstance(media, tuple | list) and len(media) == 2 and all(medium in MEDIA for medium in media)
+        self._must(media is None or pair, "media", 'None or a pair of "air" and "water"')
+        for name in ("obstacle_radius", "start", "goal", "media"):
             if getattr(self, name) is not None:
-                self._numbers(name, 3)
-        if self.media is None:
-            return
-        if not isinstance(self.media, tuple | list) or len(self.media) != 2 or not all(m in MEDIA for m in self.media):
-            raise ValueError(f'ScenarioLaw.media must be None or a pair of "air" and "water", got {self.media!r}')
-        object.__setattr__(self, "media", tuple(self.media))
-        for name, medium in zip(("start", "goal"), self.media, strict=True):
+                object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name, medium in zip(("start", "goal"), media or ()):
             end = getattr(self, name)
             if end is not None and (end[2] < 0.0) != (medium == "water"):
                 raise ValueError(f"ScenarioLaw.{name} must lie in {medium} as media says, got z = {end[2]!r} m")
 
-    def _numbers(self, name: str, length: int) -> tuple[float, ...]:
-        """Check a field that holds several numbers and keep it as a tuple, so that the law stays hashable."""
-        value = getattr(self, name)
-        if not isinstance(value, tuple | list) or len(value) != length or not all(map(_is_number, value)):
-            raise ValueError(f"ScenarioLaw.{name} must be {length} finite numbers (m), got {value!r}")
-        object.__setattr__(self, name, tuple(value))
-        return tuple(value)
+    def _must(self, sound: bool, name: str, rule: str) -> None:
+        if not sound:
+            raise ValueError(f"ScenarioLaw.{name} must be {rule}, got {getattr(self, name)!r}")
 
 
-def _is_number(value: Any) -> bool:
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return number and math.isfinite(value)
+def _are_numbers(values: Any, length: int) -> bool:
+    """Whether these are so many finite numbers."""
+    if not isinstance(values, tuple | list) or len(values) != length or any(isinstance(v, bool) for v in values):
+        return False
+    return all(isinstance(value, int | float | np.integer | np.floating) and math.isfinite(value) for value in values)
 
 
 EXPERIMENT_1 = ScenarioLaw(start=(-9.0, -9.0, 8.0), goal=(9.0, 9.0, -3.0))
@@ -95,8 +84,8 @@ EXPERIMENT_2 = ScenarioLaw(start=(9.0, -9.0, -3.0), goal=(-9.0, 9.0, 7.0))
 def prepare(law: ScenarioLaw, world: World, vehicle_radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Flatten a law in a world, for a vehicle of this radius (m), into the two read-only records that `draw` takes.
 
-    Raises ValueError when the law is impossible in this world: an end outside the box or in the transition zone, no
-    room for a drawn end or for the greatest sphere, ends that cannot be as far apart as the law says.
+    Raises ValueError when the law is impossible in this world: an end where none may be, no room for a drawn end or for
+    the greatest sphere, ends that cannot be as far apart.
     """
     space = flight_space(world, vehicle_radius)
     room = min(high - low for low, high in zip(world.lower, world.upper, strict=True))
@@ -128,8 +117,7 @@ def prepare(law: ScenarioLaw, world: World, vehicle_radius: float) -> tuple[np.n
 
 def _room_for_end(name: str, medium: int, world: World) -> tuple[list[float], list[float]]:
     """Corners (m) of the part of a medium in which an end may be drawn."""
-    low = [value + WALL_MARGIN for value in world.lower]
-    high = [value - WALL_MARGIN for value in world.upper]
+    low, high = [value + WALL_MARGIN for value in world.lower], [value - WALL_MARGIN for value in world.upper]
     if medium == 0:
         low[2] = world.zone + ZONE_MARGIN
     else:
@@ -145,16 +133,14 @@ def _room_for_end(name: str, medium: int, world: World) -> tuple[list[float], li
 
 def _check_separation(separation: float, record: np.void) -> None:
     """Raise ValueError when for some pair of media the ends cannot be so far apart (m)."""
-    for pair in ((first, second) for first in range(2) for second in range(2)):
-        shares = [record["water_share"][end] if pair[end] else 1.0 - record["water_share"][end] for end in range(2)]
-        if min(shares) == 0.0:
-            continue
-        low, high = ([record[key][end, pair[end]] for end in range(2)] for key in ("low", "high"))
-        most = float(np.linalg.norm(np.maximum(high[0] - low[1], high[1] - low[0])))
-        if most < separation:
+    low, high, water = record["low"], record["high"], record["water_share"]
+    for start, goal in itertools.product(range(2), repeat=2):
+        never = water[0] == 1 - start or water[1] == 1 - goal
+        most = float(np.linalg.norm(np.maximum(high[0, start] - low[1, goal], high[1, goal] - low[0, start])))
+        if most < separation and not never:
             raise ValueError(
-                f"ScenarioLaw.min_separation must be at most {most:.3g} m for a start in {MEDIA[pair[0]]} and a goal "
-                f"in {MEDIA[pair[1]]} of this world, got {separation!r} m"
+                f"ScenarioLaw.min_separation must be at most {most:.3g} m for a start in {MEDIA[start]} and a goal "
+                f"in {MEDIA[goal]} of this world, got {separation!r} m"
             )
 
 
@@ -174,9 +160,8 @@ def draw(
 ) -> None:
     """Draw a solvable scenario into arrays: start (4,), goal (3,), obstacles (num_obstacles, 4), float64, contiguous.
 
-    `prepared` comes from `prepare` for the same law; `first` holds the `first_numbers` of the generator if they were
-    taken from it already. Raises ValueError when the law leaves no room for ends or spheres,
-    or when none of `ATTEMPTS` scenarios was solvable.
+    `prepared` comes from `prepare`; `first` holds the `first_numbers` of the generator if those are taken. Raises
+    ValueError when there is no room for ends or spheres, or when none of `ATTEMPTS` scenarios was solvable.
     """
     record, space = prepared
     usual = first_numbers(law)
@@ -185,7 +170,13 @@ def draw(
         status = place(record, space, numbers, start, goal, obstacles)
         while status <= NO_SPHERES:
             if numbers.size >= MOST_NUMBERS * usual:
-                raise ValueError(_no_room(law, status))
+                raise ValueError(
+                    f"no ends found that are {law.min_separation} m apart: lower ScenarioLaw.min_separation"
+                    if status == NO_ENDS
+                    else f"no room for {law.num_obstacles} obstacles of radius {law.obstacle_radius} m that keep "
+                    f"{law.end_clearance} m beyond the vehicle's radius to start and goal: lower "
+                    "ScenarioLaw.end_clearance or num_obstacles"
+                )
             # The same beginning is placed again: no state has to survive between the blocks.
             numbers = np.concatenate((numbers, rng.random(numbers.size)))
             status = place(record, space, numbers, start, goal, obstacles)
@@ -197,24 +188,11 @@ def draw(
     )
 
 
-def _no_room(law: ScenarioLaw, status: int) -> str:
-    """Say what an attempt could not place."""
-    if status == NO_ENDS:
-        return f"no ends found that are {law.min_separation} m apart: lower ScenarioLaw.min_separation"
-    return (
-        f"no room for {law.num_obstacles} obstacles of radius {law.obstacle_radius} m that keep {law.end_clearance} m "
-        "beyond the vehicle's radius to start and goal: lower ScenarioLaw.end_clearance or num_obstacles"
-    )
-
-
 def generate(law: ScenarioLaw, world: World, vehicle_radius: float, rng: np.random.Generator) -> Scenario:
-    """Draw a random scenario that a vehicle of this radius (m) can solve.
+    """Draw a random scenario that a vehicle of this radius (m) can solve; equal states of `rng` give equal bits.
 
-    Equal states of `rng` give scenarios equal bit for bit. Raises ValueError for a law that is impossible in this
-    world, see `prepare` and `draw`.
+    Raises ValueError for a law that is impossible in this world, see `prepare` and `draw`.
     """
     start, goal, obstacles = np.empty(4), np.empty(3), np.empty((law.num_obstacles, 4))
     draw(law, prepare(law, world, vehicle_radius), rng, start, goal, obstacles)
-    x, y, z, yaw = start.tolist()
-    goal_x, goal_y, goal_z = goal.tolist()
-    return Scenario(start=(x, y, z, yaw), goal=(goal_x, goal_y, goal_z), obstacles=obstacles)
+    return Scenario(start=tuple(start), goal=tuple(goal), obstacles=obstacles)

@@ -66,8 +66,7 @@ def _place_one(record, space, numbers, start, goal, obstacles):
         to_start2 = (cx - start[0]) ** 2 + (cy - start[1]) ** 2 + (cz - start[2]) ** 2
         to_goal2 = (cx - goal[0]) ** 2 + (cy - goal[1]) ** 2 + (cz - goal[2]) ** 2
         if to_start2 >= reach2 and to_goal2 >= reach2:
-            obstacles[placed, 0], obstacles[placed, 1], obstacles[placed, 2] = cx, cy, cz
-            obstacles[placed, 3] = radius
+            obstacles[placed, 0], obstacles[placed, 1], obstacles[placed, 2], obstacles[placed, 3] = cx, cy, cz, radius
             placed += 1
     return SIMPLE_ROUTE if has_simple_route(space, start, goal, obstacles) else NO_SIMPLE_ROUTE
 
@@ -87,6 +86,5 @@ def place_many(record, space, numbers, chosen, starts, goals, obstacles):
     solved = np.zeros(chosen.size, np.bool_)
     for i in range(chosen.size):
         k = chosen[i]
-        status = _place_one(record, space, numbers[i], starts[k], goals[k], obstacles[k])
-        solved[i] = status == SIMPLE_ROUTE
+        solved[i] = _place_one(record, space, numbers[i], starts[k], goals[k], obstacles[k]) == SIMPLE_ROUTE
     return solved

@@ -17,24 +17,15 @@ VERSION = 1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
-    """One mission in a world of spheres.
+    """One mission in a world of spheres; equal by value and hashable.
 
-    Attributes:
-        start: x, y, z in m and yaw in rad at which the vehicle starts at rest.
-        goal: x, y, z in m.
-        obstacles: (M, 4) read-only float64 array, a sphere [x, y, z, r] in m a row; any nested sequence is copied.
-        name: what to call it in tables; counts as part of the value.
-
-    Scenarios are equal by value and hashable. Only shapes are checked here, see `validate` for the rules of a world.
-
-    Raises:
-        ValueError: a field of the wrong shape or with entries that are no numbers.
+    Raises ValueError for a wrong shape or what is no number; `validate` knows the rules of a world.
     """
 
-    start: tuple[float, float, float, float]
-    goal: tuple[float, float, float]
-    obstacles: np.ndarray
-    name: str = ""
+    start: tuple[float, float, float, float]  #: x, y, z in m and yaw in rad, where the vehicle starts at rest
+    goal: tuple[float, float, float]  #: x, y, z in m
+    obstacles: np.ndarray  #: (M, 4) read-only float64, a sphere [x, y, z, r] in m a row; any nested sequence is copied
+    name: str = ""  #: what to call it in tables; counts as part of the value
 
     def __post_init__(self) -> None:
         """Bring every field to its one form: tuples of float, and an own read-only array."""
@@ -102,10 +93,9 @@ def check_radius(vehicle_radius: float) -> None:
 
 
 def validate(scenario: Scenario, world: World, vehicle_radius: float) -> None:
-    """Check that a vehicle of this radius (m) can start in the scenario and rest at its goal.
+    """Raise ValueError unless a vehicle of this radius (m) can start in the scenario and rest at its goal.
 
-    Raises ValueError naming the thing, the rule, the unit and the value when an end lies outside the box, inside the
-    transition zone or too near a sphere, or when a number is not finite or a sphere's radius is not positive.
+    Ends lie in the box, outside the transition zone and clear of every sphere; numbers are finite, radii positive.
     """
     check_radius(vehicle_radius)
     check_end("start", scenario.start[:3], world)
@@ -131,14 +121,7 @@ def save_scenario(scenario: Scenario, path: str | Path) -> None:
 
     Raises ValueError naming the path for a number that is not finite, and OSError when the file cannot be written.
     """
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "name": scenario.name,
-        "start": scenario.start,
-        "goal": scenario.goal,
-        "obstacles": scenario.obstacles.tolist(),
-    }
+    content = {"format": FORMAT, "version": VERSION, **vars(scenario), "obstacles": scenario.obstacles.tolist()}
     try:
         text = json.dumps(content, indent=1, allow_nan=False)
     except ValueError:
@@ -171,21 +154,15 @@ def _parse(text: str) -> Scenario:
     for problem, keys in (("missing", known - content.keys()), ("unknown", content.keys() - known)):
         if keys:
             raise ValueError(f"{problem} key {', '.join(map(repr, sorted(keys)))}")
-    _check_row("start", content["start"], 4)
-    _check_row("goal", content["goal"], 3)
     if not isinstance(content["obstacles"], list):
         raise ValueError(f"obstacles must be a list, got {content['obstacles']!r}")
-    for index, row in enumerate(content["obstacles"]):
-        _check_row(f"obstacle {index}", row, 4)
+    rows = [("start", content["start"], 4), ("goal", content["goal"], 3)]
+    for name, row, length in rows + [(f"obstacle {k}", row, 4) for k, row in enumerate(content["obstacles"])]:
+        numbers = isinstance(row, list) and len(row) == length and all(type(entry) in (int, float) for entry in row)
+        # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
+        if not numbers or not all(abs(entry) <= sys.float_info.max for entry in row):
+            raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
     return Scenario(**{key: content[key] for key in known - {"format", "version"}})
-
-
-def _check_row(name: str, row: Any, length: int) -> None:
-    """Raise ValueError unless a value read from JSON is a list of so many finite numbers."""
-    numbers = isinstance(row, list) and len(row) == length and all(type(entry) in (int, float) for entry in row)
-    # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
-    if not numbers or not all(abs(entry) <= sys.float_info.max for entry in row):
-        raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
 
 
 def _reject_constant(constant: str) -> NoReturn:
