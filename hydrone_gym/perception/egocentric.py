@@ -40,7 +40,7 @@ yaw reference is unused, it is the heading of the moment, so that the vehicle do
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,32 +53,20 @@ from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import new_rows
 from hydrone_gym.simulation.time_to_go import time_to_go
 from hydrone_gym.surface import is_air
-from hydrone_gym.vehicle import Vehicle
-from hydrone_gym.world.world import World
 
 RawObservation = Mapping[str, NDArray]
 
 LIMIT = 5.0  # of every entry
 
-_AXES = ("ahead", "left", "up")
-NAMES = (
-    *(f"goal_{axis}" for axis in _AXES),
-    *(f"goal_near_{axis}" for axis in _AXES),
-    "height",
-    *(f"velocity_{axis}" for axis in _AXES),
-    "roll",
-    "pitch",
-    "sin_yaw",
-    "cos_yaw",
-    *(f"reference_{axis}" for axis in _AXES),
-    "medium",
-    "zone",
-    *(f"wall_{side}" for side in ("ahead", "behind", "left", "right", "up", "down")),
-    "goal_horizontal",
-    "goal_vertical",
-    *RAY_NAMES,
-    "clock",
-)
+
+def _axes(word: str) -> list[str]:
+    return [f"{word}_{axis}" for axis in ("ahead", "left", "up")]
+
+
+_VEHICLE = ("height", *_axes("velocity"), "roll", "pitch", "sin_yaw", "cos_yaw", *_axes("reference"), "medium", "zone")
+_WALLS = [f"wall_{side}" for side in ("ahead", "behind", "left", "right", "up", "down")]
+_WAYS = (*_WALLS, "goal_horizontal", "goal_vertical", *RAY_NAMES)
+NAMES = (*_axes("goal"), *_axes("goal_near"), *_VEHICLE, *_WAYS, "clock")
 OBSERVATION_SIZE = len(NAMES)
 _RAYS = NAMES.index(RAY_NAMES[0])
 _CLOCK = NAMES.index("clock")
@@ -153,7 +141,7 @@ def observe_rows(told, obstacles, found, memory, order, values, seen):
     """Write observations and move their memory on: once a period, neither more nor less.
 
     Args:
-        told, obstacles, found: fields of a `Perceived`.
+        told, obstacles, found: a `Perceived`.
         memory: (n, 5) a `Memory` a row, updated.
         order: (k,) int64, which rows.
         values: from `pack_egocentric`.
@@ -180,28 +168,12 @@ def new_memory(count: int) -> NDArray[np.float64]:
     return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
-class Modelled(Protocol):
-    """A belief, a simulation, or anything else that has a vehicle and a world."""
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The vehicle."""
-
-    @property
-    def world(self) -> World:
-        """The world."""
-
-
 class Egocentric:
-    """Sees and acts as `interface="egocentric"` does: for environments, and through the raw interface, bit for bit.
+    """Sees and acts as `interface="egocentric"` does: for environments, and through the raw interface, bit for bit."""
 
-    Args:
-        model: what a policy believes; only its vehicle and world are read.
-    """
-
-    def __init__(self, model: Modelled) -> None:
-        """Pack the constants."""
-        self.values = pack_egocentric(model.vehicle, model.world)
+    def __init__(self, model: Any) -> None:
+        """Pack what is believed: a model's vehicle, world and, if it has one, law."""
+        self.values = pack_egocentric(model.vehicle, model.world, getattr(model, "law", "paper"))
 
     def look(
         self, perceived: Perceived, memory: NDArray[np.float64], rows: NDArray[np.int64], seen: NDArray[np.float32]
@@ -220,18 +192,14 @@ class Egocentric:
     def observe(
         self, observation: RawObservation, memory: Memory | None = None, starting: ArrayLike | None = None
     ) -> tuple[NDArray[np.float32], Memory]:
-        """Return the flat observation and the new memory; call it once a period. Nothing given is changed or shared.
+        """Return the flat observation, (68,) or (n, 68), and the new memory; call it once a period.
+
+        Nothing given is changed or shared. Raises ValueError for a missing key or a wrong shape.
 
         Args:
             observation: raw Dict observation, single or batched along the first axis.
             memory: what the last call returned; None where all episodes begin.
             starting: () or (n,) True where an episode begins: that memory is dropped.
-
-        Returns:
-            (68,) or (n, 68) float32, and the `Memory`.
-
-        Raises:
-            ValueError: a missing key or a wrong shape.
         """
         perceived, single = _load(observation)
         count = len(perceived.told)
@@ -250,13 +218,8 @@ class Egocentric:
     def reference(self, action: ArrayLike, observation: RawObservation, memory: Memory) -> NDArray[np.float32]:
         """Return the raw action, (4,) or (n, 4) float32 in m, m, m, rad, that a relative action stands for.
 
-        Args:
-            action: (3,) or (n, 3) in [-1, 1], clipped to it; read as float32.
-            observation: the raw observation it answers.
-            memory: what `observe` returned for that observation.
-
-        Raises:
-            ValueError: a missing key, a wrong shape, or an action that is not finite.
+        `action` is (3,) or (n, 3), clipped to [-1, 1]; `memory` is what `observe` returned for the observation. Raises
+        ValueError for a missing key, a wrong shape, or an action that is not finite.
         """
         perceived, single = _load(observation)
         count = len(perceived.told)
@@ -270,8 +233,7 @@ class Egocentric:
 
 def _shaped(name: str, given: ArrayLike, shape: tuple[int, ...], single: bool) -> NDArray[np.float64]:
     """Check an array against (n, ...), or (...) for a single one, and return it as (n, ...) float64."""
-    array = np.asarray(given, np.float64)
-    wanted = shape[1:] if single else shape
+    array, wanted = np.asarray(given, np.float64), shape[1:] if single else shape
     if array.shape != wanted:
         raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
     return array.reshape(shape)

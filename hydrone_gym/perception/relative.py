@@ -15,15 +15,14 @@ from hydrone_gym.world.world import World
 STEP = (2.0, 2.0, 1.5)  # m along x', y', z at full action: 3.2 m at most, about as far as the vehicle senses
 MARGIN = 0.2  # m: the nearest a reference comes to the box
 
-
 _SPEEDS = np.dtype([(name, np.float64) for name in CruiseSpeeds._fields])
 _BOX = ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max", "zone", "radius")  # m
 EGOCENTRIC = np.dtype([*((name, np.float64) for name in _BOX), ("speeds", _SPEEDS)])
 
 
-def pack_egocentric(vehicle: Vehicle, world: World) -> np.ndarray:
+def pack_egocentric(vehicle: Vehicle, world: World, law: str = "paper") -> np.ndarray:
     """Return the constants of the interface as one record (1,), dtype `EGOCENTRIC`."""
-    speeds = tuple(cruise_speeds(envelope_of(vehicle)))
+    speeds = tuple(cruise_speeds(envelope_of(vehicle, law)))
     return np.array([(*world.lower, *world.upper, world.zone, vehicle.radius, speeds)], EGOCENTRIC)
 
 
