@@ -63,8 +63,8 @@ def perceive(rows: np.ndarray, known: NDArray[np.float64], found: NDArray[np.int
 def detect(now, n, lanes, sensor_range):
     """Append what row n has newly detected, within `sensor_range` (m), to its known spheres, ties of a period by index.
 
-    `now` has the fields of `hydrone_gym.envs.task.Episodes`, with `lanes` rows a block; `seen`, `found` and `known` are
-    updated.
+    `now` has `obstacles` and `closest`, `lanes` rows a block as in the simulation, and `seen` (rows, M), 1 if detected,
+    `found` (rows,) and `known` (rows, M, 4), which are updated; all in m.
     """
     block, lane = n // lanes, n % lanes
     for j in range(now.seen.shape[1]):

@@ -48,7 +48,7 @@ class Screen:
             from hydrone_gym.rendering.frame import Painter
             from hydrone_gym.rendering.window import Window
 
-            self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
+            self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period, law=simulation.law)
             self._painter = Painter(view, simulation.world, simulation.vehicle)
             self._window = Window(view.size) if mode == "human" else None
 

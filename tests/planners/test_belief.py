@@ -21,7 +21,7 @@ def env_that_flies(vehicle):
     """An environment made for the nominal vehicle, in which another one is flown."""
     env = gym.make("HydroneGym/AirToWater-v0")
     inner = env.unwrapped
-    inner.simulation = Simulation(vehicle, inner.world, inner.options.period)
+    inner._core.simulations[0] = Simulation(vehicle, inner.world, inner.options.period)
     return env
 
 
