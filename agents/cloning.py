@@ -24,8 +24,7 @@ from agents.demonstration_files import find_datasets, load_demonstrations
 from agents.demonstrations import Demonstration, Demonstrations
 from hydrone_gym.evaluation import provenance
 from hydrone_gym.evaluation.suites import MISSIONS
-from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric
-from hydrone_gym.perception.relative import STEP
+from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, STEP, Egocentric
 from hydrone_gym.simulation.outcome import Outcome
 
 REPORT = "cloning.json"

@@ -24,8 +24,7 @@ from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.bodies import NOWHERE
-from hydrone_gym.world.generator import draw, first_numbers, prepare
-from hydrone_gym.world.placement import place_many
+from hydrone_gym.world.generator import draw, first_numbers, place_many, prepare
 from hydrone_gym.world.scenario import Scenario
 
 _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
@@ -59,7 +58,6 @@ class EpisodeBatch:
         parts = range(max(1, min(threads, count // _ROWS_A_THREAD)))
         self.simulations = [Simulation(vehicle, world, options.period, lanes, options.controller) for _ in parts]
         simulation = self.simulations[0]
-        self._prepared = prepare(self.draws, world, vehicle.radius)
         self.episodes = new_episodes(count, self._obstacles, lanes)
         self.transitions = np.full(count, None, dtype=object)
         self.ended, self.starting = np.ones(count, bool), np.zeros(count, bool)
@@ -76,8 +74,9 @@ class EpisodeBatch:
         self._bind()
 
     def _bind(self) -> None:
-        """Make what shares memory with the episodes, and the threads."""
-        now, lanes, threads = self.episodes, self.lanes, len(self.simulations)
+        """Make what shares memory with the episodes or is read-only, and the threads."""
+        now, lanes, threads, model = self.episodes, self.lanes, len(self.simulations), self.simulations[0]
+        self._prepared = prepare(self.draws, model.world, model.vehicle.radius)
         self.perceived = perceive(now.rows, now.known, now.found)
         self._raw = self.perceived.observation()
         self._logs = now.rows["crossing_log"]
@@ -88,12 +87,12 @@ class EpisodeBatch:
         self._flown = []
         for part in self._parts:
             own = slice(part.start // lanes, -(-part.stop // lanes))
-            task = pack_task(self.simulations[0], self.options.time_limit, part)
+            task = pack_task(model, self.options.time_limit, part)
             self._flown.append((part, task, now.rows[part], now.obstacles[own], now.closest[own]))
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
-        shared = ("perceived", "_raw", "_logs", "_first", "_flown", "_pool")
+        shared = ("perceived", "_prepared", "_raw", "_logs", "_first", "_flown", "_pool")
         return {name: value for name, value in self.__dict__.items() if name not in shared}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -204,7 +203,13 @@ class EpisodeBatch:
                 missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE
         drawn = np.array([k for k in range(count) if scenarios is None or scenarios[k] is None], np.int64)
         if drawn.size:
-            self._draw([self.generators[row] for row in rows[drawn].tolist()], drawn, missions)
+            # one kernel call places all, the rare rest goes one by one
+            generators = [self.generators[row] for row in rows[drawn].tolist()]
+            numbers = np.stack([generator.random(first_numbers(self.draws)) for generator in generators])
+            solved = place_many(*self._prepared, numbers, drawn, *missions)
+            for i in np.flatnonzero(~solved).tolist():
+                start, goal, spheres = (array[drawn[i]] for array in missions)
+                draw(self.draws, self._prepared, generators[i], start, goal, spheres, numbers[i])
         return missions
 
     def begin(self, rows: NDArray[np.int64], missions: Missions, *, look: bool = True) -> None:
@@ -217,16 +222,6 @@ class EpisodeBatch:
             self.memory[rows, LEAST] = np.inf
             if look:
                 self.look(rows)
-
-    def _draw(self, generators: list[np.random.Generator], drawn: NDArray[np.int64], missions: Missions) -> None:
-        """Draw missions, each from its own stream: one kernel call places all, the rare rest goes one by one."""
-        numbers = np.empty((len(drawn), first_numbers(self.draws)))
-        for generator, line in zip(generators, numbers):
-            generator.random(out=line)
-        solved = place_many(*self._prepared, numbers, drawn, *missions)
-        for i in np.flatnonzero(~solved).tolist():
-            start, goal, spheres = (array[drawn[i]] for array in missions)
-            draw(self.draws, self._prepared, generators[i], start, goal, spheres, numbers[i])
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""

@@ -45,10 +45,8 @@ def batch_info(
 ) -> dict[str, Any]:
     """Return `info` for many rows, arrays with their masks as Gymnasium's vector environments give them.
 
-    Args:
-        columns: (len(REPORT), n), not copied.
-        transitions: (n,) object, a list of crossings a row.
-        mask: (n,) which rows to fill in, the others are zero (None for objects); all unless given.
+    `columns` (len(REPORT), n) are not copied, `transitions` (n,) are objects, a list of crossings a row. Rows that the
+    `mask` (n,) leaves out are zero, None for objects.
     """
     crossings, masks = transitions.copy(), np.ones((len(_MASKS), len(transitions)), bool)
     if mask is not None:

@@ -70,13 +70,6 @@ def pack_task(simulation: Simulation, time_limit: float, part: slice) -> np.ndar
 
 
 @inlined
-def _potential_of(row, speeds):
-    """Time-to-go (s) of a row."""
-    s, goal = row.state, row.goal
-    return time_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], speeds)
-
-
-@inlined
 def _place_row(row, missions, k):
     """Put a row at rest and level at start k, its reference where it is, memory and counters empty."""
     for c in range(12):
@@ -116,7 +109,8 @@ def _judge(now, n, params):
     row, report = now.rows[n], now.report[n]
     if row.outcome == RUNNING and row.ticks >= params.limit:
         row.outcome = TIMEOUT
-    s, after = row.state, _potential_of(row, params.speeds)
+    s, goal = row.state, row.goal
+    after = time_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], params.speeds)
     write_reward(report, report[OUTCOME + 4], after, (s[6], s[7], s[8]), row.outcome)
     report[OUTCOME], report[OUTCOME + 1], report[OUTCOME + 2] = row.outcome, row.ticks * TICK, row.energy
     report[OUTCOME + 3], report[OUTCOME + 4], report[OUTCOME + 5] = row.clearance, after, row.crossings
@@ -146,7 +140,6 @@ def begin_rows(now, missions, order, values):
         n = order[k]
         _place_row(now.rows[n], missions, k)
         _surround(now, n, missions, k, params)
-        now.report[n, OUTCOME + 4] = _potential_of(now.rows[n], params.speeds)
         _judge(now, n, params)
         for term in range(OUTCOME):
             now.report[n, term] = 0.0

@@ -46,11 +46,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     drawn; `reset_mask` (n,) bool, which rows to reset.
     """
 
-    metadata: dict[str, Any] = {
-        "render_modes": ["rgb_array"],
-        "render_fps": 2,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 2, "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     @takes(VectorOptions)
     def __init__(self, options: VectorOptions) -> None:
@@ -100,16 +96,14 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         self._core.begin(rows, self._core.missions_of(rows, scenarios))
         if self.render_mode is not None:
             self._core.show(rows)
-        mask = np.zeros(self.num_envs, bool)
-        mask[rows] = True
         observation = self._core.new_observation()
         self._core.observe(slice(0, self.num_envs), observation)
-        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, mask)
+        begun = np.isin(np.arange(self.num_envs), rows)
+        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, begun)
 
-    def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
+    def _seed(self, seed: Any, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
-        count = range(self.num_envs)
-        seeds: Any = seed if np.ndim(seed) else [None if seed is None else seed + i for i in count]  # type: ignore[arg-type, operator]
+        seeds = seed if np.ndim(seed) else [None if seed is None else seed + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
         streams = self._core.generators
@@ -153,10 +147,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         return flown.observation, flown.report[_REWARD].copy(), ended & ~truncated, truncated, info
 
     def render(self) -> tuple[RenderFrame, ...] | None:
-        """Return a new picture (height, width, 3) of each row, None without a `render_mode`.
-
-        Raises ResetNeeded before the first reset.
-        """
+        """Return a new picture (height, width, 3) of each row, None without `render_mode`; ResetNeeded before reset."""
         first = self._core.render(0)
         rest: Any = (self._core.render(row) for row in range(1, self.num_envs))
         return None if first is None else (first, *rest)

@@ -46,17 +46,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.perception.rays import FIXED, RAY_NAMES, cast_along, cast_fixed, leave_box
-from hydrone_gym.perception.relative import mission_frame, pack_egocentric, place_references
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import new_rows
-from hydrone_gym.simulation.time_to_go import time_to_go
+from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
 from hydrone_gym.surface import is_air
+from hydrone_gym.vehicle import Vehicle
+from hydrone_gym.world.world import World
 
 RawObservation = Mapping[str, NDArray]
 
-LIMIT = 5.0  # of every entry
+LIMIT = 5.0  # of every entry of an observation
+STEP = (2.0, 2.0, 1.5)  # m along x', y', z at full action: 3.2 m at most, about as far as the vehicle senses
+MARGIN = 0.2  # m: the nearest a reference comes to the box
+
+_BOX = [(name, np.float64) for name in ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max", "zone", "radius")]  # m
+EGOCENTRIC = np.dtype([*_BOX, ("speeds", [(name, np.float64) for name in CruiseSpeeds._fields])])
 
 
 def _axes(word: str) -> list[str]:
@@ -86,6 +93,34 @@ class Memory(NamedTuple):
     start: NDArray[np.float64]  # (3,) where the episode started, m
     least: NDArray[np.float64]  # () least time-to-go so far, s; infinity: an episode begins
     clock: NDArray[np.float64]  # () periods since it last fell
+
+
+def pack_egocentric(vehicle: Vehicle, world: World, law: str = "paper") -> np.ndarray:
+    """Return the constants of the interface as one record (1,), dtype `EGOCENTRIC`."""
+    speeds = tuple(cruise_speeds(envelope_of(vehicle, law)))
+    return np.array([(*world.lower, *world.upper, world.zone, vehicle.radius, speeds)], EGOCENTRIC)
+
+
+@inlined
+def mission_frame(start_x, start_y, goal_x, goal_y):
+    """Cosine and sine of the azimuth of x'; of the world's x where start and goal (m) give none."""
+    dx, dy = goal_x - start_x, goal_y - start_y
+    length = np.sqrt(dx * dx + dy * dy)
+    level = 1e-6 <= length < np.inf
+    return (dx / length if level else 1.0), (dy / length if level else 0.0)
+
+
+@inlined
+def _inside(value, low, high):
+    """Keep a coordinate (m) MARGIN inside two walls, as float32 would; NaN stays NaN."""
+    low, high = low + MARGIN, high - MARGIN
+    return np.float64(np.float32(low if value < low else (high if value > high else value)))
+
+
+@inlined
+def _unit(value):
+    """Clip to [-1, 1]; NaN stays NaN."""
+    return -1.0 if value < -1.0 else (1.0 if value > 1.0 else value)
 
 
 @inlined
@@ -138,14 +173,9 @@ def _remember(memory, state, goal, speeds):
 
 @kernel
 def observe_rows(told, obstacles, found, memory, order, values, seen):
-    """Write observations and move their memory on: once a period, neither more nor less.
+    """Write observations of rows `order` (k,), int64, of a `Perceived`, and move their memory on: once a period.
 
-    Args:
-        told, obstacles, found: a `Perceived`.
-        memory: (n, 5) a `Memory` a row, updated.
-        order: (k,) int64, which rows.
-        values: from `pack_egocentric`.
-        seen: (n, OBSERVATION_SIZE) float32, those rows written.
+    `memory` (n, 5) holds a `Memory` a row, `seen` is (n, OBSERVATION_SIZE), float32.
     """
     params = values[0]
     for k in range(order.size):
@@ -163,8 +193,27 @@ def observe_rows(told, obstacles, found, memory, order, values, seen):
         out[_CLOCK] = _clip(_PERIODS * own[LEAST + 1])
 
 
+@kernel
+def place_references(told, actions, memory, values, out):
+    """Write the references (n, 4), in m, m, m, rad and every number a float32, of relative actions (n, 3), float32.
+
+    `told` is of a `Perceived`, `memory` (n, 3 or more) where the episodes started, x, y, z in m.
+    """
+    p = values[0]
+    for n in range(out.shape[0]):
+        row = told[n]
+        s, goal = row.state, row.goal
+        cosine, sine = mission_frame(memory[n, 0], memory[n, 1], goal[0], goal[1])
+        ahead = STEP[0] * _unit(np.float64(actions[n, 0]))
+        left = STEP[1] * _unit(np.float64(actions[n, 1]))
+        out[n, 0] = _inside(s[0] + (cosine * ahead - sine * left), p.x_min, p.x_max)
+        out[n, 1] = _inside(s[1] + (sine * ahead + cosine * left), p.y_min, p.y_max)
+        out[n, 2] = _inside(s[2] + STEP[2] * _unit(np.float64(actions[n, 2])), p.z_min, p.z_max)
+        out[n, 3] = np.float64(np.float32(row.reference[3] if is_air(s[2]) else s[5]))
+
+
 def new_memory(count: int) -> NDArray[np.float64]:
-    """Return (n, 5) a `Memory` a row, of episodes that begin: start, least and clock."""
+    """Return (n, 5) a `Memory` a row, of episodes that begin."""
     return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
@@ -194,12 +243,8 @@ class Egocentric:
     ) -> tuple[NDArray[np.float32], Memory]:
         """Return the flat observation, (68,) or (n, 68), and the new memory; call it once a period.
 
-        Nothing given is changed or shared. Raises ValueError for a missing key or a wrong shape.
-
-        Args:
-            observation: raw Dict observation, single or batched along the first axis.
-            memory: what the last call returned; None where all episodes begin.
-            starting: () or (n,) True where an episode begins: that memory is dropped.
+        `memory` is what the last call returned, None where all episodes begin; it is dropped where `starting`, () or
+        (n,), is True. Nothing given is changed or shared. Raises ValueError for a missing key or a wrong shape.
         """
         perceived, single = _load(observation)
         count = len(perceived.told)

@@ -29,8 +29,15 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Bring every field to its one form: tuples of float, and an own read-only array."""
-        object.__setattr__(self, "start", _numbers("start", self.start, 4))
-        object.__setattr__(self, "goal", _numbers("goal", self.goal, 3))
+        for name, length, unit in (("start", 4, "x, y, z in m and yaw in rad"), ("goal", 3, "x, y, z in m")):
+            try:
+                numbers = tuple(map(float, getattr(self, name)))
+            except (TypeError, ValueError):
+                numbers = ()
+            if len(numbers) != length:
+                given = getattr(self, name)
+                raise ValueError(f"Scenario.{name} must hold {length} numbers ({unit}), got {given!r}")
+            object.__setattr__(self, name, numbers)
         try:
             obstacles = np.array(self.obstacles, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
@@ -60,21 +67,8 @@ class Scenario:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore after pickling or copying, which forget that the array is read-only."""
-        for name, value in state.items():
-            object.__setattr__(self, name, value)
+        self.__dict__.update(state)
         self.obstacles.flags.writeable = False
-
-
-def _numbers(name: str, value: Any, length: int) -> tuple[Any, ...]:
-    """Turn a sequence of numbers into a tuple of float."""
-    try:
-        numbers = tuple(map(float, value))
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) != length:
-        unit = "x, y, z in m and yaw in rad" if length == 4 else "x, y, z in m"
-        raise ValueError(f"Scenario.{name} must hold {length} numbers ({unit}), got {value!r}")
-    return numbers
 
 
 def check_end(name: str, position: tuple[float, ...], world: World) -> None:
