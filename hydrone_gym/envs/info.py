@@ -14,7 +14,8 @@ from hydrone_gym.simulation.storage import CROSSING_FIELDS, LOGGED_CROSSINGS
 
 _OUTCOMES = tuple(Outcome)
 _BATCH = ("outcome", "time", "energy", "clearance", "transitions", "reward_terms")
-_MASKS = tuple(f"_{name}" for name in (*TERMS, *_BATCH))
+_KEYS = (*_BATCH, *(f"_{name}" for name in _BATCH))
+_TERM_KEYS = (*TERMS, *(f"_{name}" for name in TERMS))
 
 
 def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -48,11 +49,11 @@ def batch_info(
     `columns` (len(REPORT), n) are not copied, `transitions` (n,) are objects, a list of crossings a row. Rows that the
     `mask` (n,) leaves out are zero, None for objects.
     """
-    crossings, masks = transitions.copy(), np.ones((len(_MASKS), len(transitions)), bool)
+    terms, crossings = len(TERMS), transitions.copy()
+    masks = np.ones((terms + len(_BATCH), len(transitions)), bool)
     if mask is not None:
         columns = np.where(mask, columns, 0.0)
         masks[:], crossings[~mask] = mask, None
-    terms = len(TERMS)
-    reward_terms = dict(zip((*TERMS, *_MASKS[:terms]), (*columns[:terms], *masks[:terms])))
+    reward_terms: dict[str, Any] = dict(zip(_TERM_KEYS, (*columns[:terms], *masks[:terms])))
     values = (columns[OUTCOME].astype(np.int64), *columns[OUTCOME + 1 : OUTCOME + 4], crossings, reward_terms)
-    return dict(zip((*_BATCH, *_MASKS[terms:]), (*values, *masks[terms:]), strict=True))
+    return dict(zip(_KEYS, (*values, *masks[terms:]), strict=True))
