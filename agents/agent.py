@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent_file import TEXT, AgentFile, read_agent
-from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, Memory, Modelled, RawObservation
+from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, Memory, RawObservation
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.world.world import World
 
@@ -27,7 +27,7 @@ class Agent:
     Raises ValueError for a network with other inputs or outputs than the egocentric interface has.
     """
 
-    def __init__(self, file: AgentFile, model: Modelled | None = None) -> None:
+    def __init__(self, file: AgentFile, model: Any = None) -> None:
         """Check that the network fits the interface."""
         sizes = file.network.sizes
         if (sizes[0], sizes[-1]) != (OBSERVATION_SIZE, ACTIONS):

@@ -36,8 +36,7 @@ class Belief:
         """Return a belief as it is, or one of the same model as a `Simulation` or the options of an environment."""
         if isinstance(model, cls):
             return model
-        law = getattr(model, "law", "paper")  # options draw scenarios by a law of another kind
-        law = law if isinstance(law, str) else "paper"
+        law: Any = getattr(model, "controller", None) or getattr(model, "law", "paper")  # of options, of a simulation
         return cls(vehicle=model.vehicle, world=model.world, period=model.period, law=law)
 
     @property

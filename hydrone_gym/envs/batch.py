@@ -16,15 +16,7 @@ from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
 from hydrone_gym.envs.requests import REFERENCE, checked
 from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
-from hydrone_gym.envs.task import (
-    OUTCOME,
-    REPORT,
-    Missions,
-    begin_rows,
-    new_episodes,
-    pack_task,
-    settle,
-)
+from hydrone_gym.envs.task import OUTCOME, REPORT, Missions, begin_rows, new_episodes, pack_task, settle
 from hydrone_gym.perception.egocentric import LEAST, OBSERVATION_SIZE, Egocentric, new_memory
 from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.rendering.view import new_screen
@@ -32,8 +24,7 @@ from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.bodies import NOWHERE
-from hydrone_gym.world.generator import draw, first_numbers, prepare
-from hydrone_gym.world.placement import place_many
+from hydrone_gym.world.generator import draw, first_numbers, place_many, prepare
 from hydrone_gym.world.scenario import Scenario
 
 _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
@@ -52,38 +43,30 @@ class Flown(NamedTuple):
 
 
 class EpisodeBatch:
-    """The episodes of an environment.
+    """The episodes of an environment: `count` rows, none of which holds one before `begin`.
 
-    Args:
-        options: what every row flies.
-        count: number of rows.
-        lanes: how many rows are advanced in one go: 1 for a single row, 16 for batches.
-        threads: blocks of lanes are spread over this many threads when there are enough rows.
-        render_modes: those it can be drawn in.
+    `lanes` rows are advanced in one go: 1 for a single row, 16 for batches. Blocks of lanes are spread over `threads`
+    when there are enough rows. `render_modes` are those it can be drawn in.
     """
 
     def __init__(
         self, options: Options, count: int, lanes: int, threads: int = 1, render_modes: tuple[str, ...] = ("rgb_array",)
     ) -> None:
-        """Make the storage; rows hold no episode before `begin`."""
-        self.options, self.count, self.lanes = options, count, lanes
-        vehicle, world = named_vehicle(options.vehicle), options.world
-        self.episodes = new_episodes(count, options.num_obstacles, lanes)
+        """Make the storage."""
+        self.options, self.count, self.lanes, self.draws = options, count, lanes, options.draws
+        vehicle, world, self._obstacles = named_vehicle(options.vehicle), options.world, options.num_obstacles
+        parts = range(max(1, min(threads, count // _ROWS_A_THREAD)))
+        self.simulations = [Simulation(vehicle, world, options.period, lanes, options.controller) for _ in parts]
+        simulation = self.simulations[0]
+        self.episodes = new_episodes(count, self._obstacles, lanes)
         self.transitions = np.full(count, None, dtype=object)
-        self.ended = np.ones(count, bool)
-        self.starting = np.zeros(count, bool)
+        self.ended, self.starting = np.ones(count, bool), np.zeros(count, bool)
         self.generators: list[np.random.Generator] = []
         self.reference_filter: ReferenceFilter | None = None
-        self.law, self._obstacles = options.law, options.num_obstacles
-        self._prepared = prepare(self.law, world, vehicle.radius)
-        threads = max(1, min(threads, count // _ROWS_A_THREAD))
-        self.simulations = [Simulation(vehicle, world, options.period, lanes) for _ in range(threads)]
-        self.screen = new_screen(
-            options.render_mode, options.render_size, options.camera, self.simulations[0], render_modes
-        )
-        self.egocentric = Egocentric(self.simulations[0]) if options.interface == "egocentric" else None
+        self.screen = new_screen(options.render_mode, options.render_size, options.camera, simulation, render_modes)
+        self.egocentric = Egocentric(simulation) if options.interface == "egocentric" else None
         self.memory, self.seen = new_memory(count), np.zeros((count, OBSERVATION_SIZE), np.float32)  # if egocentric
-        references, raw = action_space(world), observation_space(vehicle, world, options.num_obstacles)
+        references, raw = action_space(world), observation_space(simulation, self._obstacles)
         self.sphere_space: Any = raw["obstacles"]
         self.action_space = references if self.egocentric is None else relative_action_space()
         self.observation_space = raw if self.egocentric is None else egocentric_space()
@@ -91,8 +74,9 @@ class EpisodeBatch:
         self._bind()
 
     def _bind(self) -> None:
-        """Make what shares memory with the episodes, and the threads."""
-        now, lanes, threads = self.episodes, self.lanes, len(self.simulations)
+        """Make what shares memory with the episodes or is read-only, and the threads."""
+        now, lanes, threads, model = self.episodes, self.lanes, len(self.simulations), self.simulations[0]
+        self._prepared = prepare(self.draws, model.world, model.vehicle.radius)
         self.perceived = perceive(now.rows, now.known, now.found)
         self._raw = self.perceived.observation()
         self._logs = now.rows["crossing_log"]
@@ -100,16 +84,15 @@ class EpisodeBatch:
         blocks = -(-self.count // lanes)
         edges = [lanes * round(blocks * k / threads) for k in range(threads)] + [self.count]
         self._parts = [slice(a, b) for a, b in pairwise(edges)]
-        self._orders = [np.arange(part.start, part.stop) for part in self._parts]
-        simulation, limit, self._flown = self.simulations[0], self.options.time_limit, []
+        self._flown = []
         for part in self._parts:
             own = slice(part.start // lanes, -(-part.stop // lanes))
-            task = pack_task(simulation.vehicle, simulation.world, limit, lanes, part)
+            task = pack_task(model, self.options.time_limit, part)
             self._flown.append((part, task, now.rows[part], now.obstacles[own], now.closest[own]))
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
-        shared = ("perceived", "_raw", "_logs", "_first", "_flown", "_pool")
+        shared = ("perceived", "_prepared", "_raw", "_logs", "_first", "_flown", "_pool")
         return {name: value for name, value in self.__dict__.items() if name not in shared}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -126,24 +109,19 @@ class EpisodeBatch:
     def new_observation(self) -> Any:
         """Return room for an observation of all rows."""
         if self.egocentric is not None:
-            return np.empty(self.seen.shape, np.float32)
-        return {} if self._pool is None else {key: np.empty(array.shape) for key, array in self._raw.items()}
+            return np.empty_like(self.seen)
+        return {key: np.empty(array.shape) for key, array in self._raw.items()}
 
     def observe(self, part: slice, out: Any) -> None:
         """Copy what a part of the rows shows now into an observation of all."""
         if self.egocentric is not None:
             out[part] = self.seen[part]
-        elif self._pool is None:
-            out.update((key, array.copy()) for key, array in self._raw.items())
-        else:
-            for key, array in self._raw.items():
-                out[key][part] = array[part]
+            return
+        for key, array in self._raw.items():
+            out[key][part] = array[part]
 
     def references(self, actions: ArrayLike) -> NDArray[np.float64]:
-        """Return the references (n, 4) that actions stand for, as they are flown.
-
-        Raises ValueError for actions of another shape or that are not finite.
-        """
+        """Return the references (n, 4) that actions stand for, as they are flown; ValueError for a bad action."""
         if self.egocentric is None:
             given = checked(actions, (self.count, 4), REFERENCE, np.float64)
             references = np.minimum(np.maximum(given, self.low), self.high)
@@ -182,7 +160,13 @@ class EpisodeBatch:
         report, now = (np.empty((len(REPORT), self.count)) for _ in range(2))
         last_observations, last_transitions = np.full((2, self.count if same_step else 0), None, dtype=object)
         flown = Flown(report if same_step else now, now, self.new_observation(), last_observations, last_transitions)
-        self._spread(lambda k: self._fly_part(k, references, flown))
+        rest = range(1, len(self._parts))
+        jobs = [self._pool.submit(self._fly_part, k, references, flown) for k in rest] if self._pool else []
+        try:
+            self._fly_part(0, references, flown)
+        finally:
+            for job in jobs:
+                job.result()
         return flown
 
     def _fly_part(self, k: int, references: NDArray[np.float64], flown: Flown) -> None:
@@ -194,7 +178,7 @@ class EpisodeBatch:
         self.note_crossings(part)
         if missions is not None:
             self.begin(again, missions, look=False)
-        self.look(self._orders[k])
+        self.look(np.arange(part.start, part.stop))
         np.not_equal(report[part, OUTCOME], RUNNING, out=ended)
         if flown.report is not flown.now:
             flown.report[:, part] = report[part].T
@@ -207,27 +191,25 @@ class EpisodeBatch:
         flown.now[:, part] = report[part].T
         self.observe(part, flown.observation)
 
-    def _spread(self, work: Callable[[int], None]) -> None:
-        """Do every part's work, the first of them in this thread."""
-        jobs = [] if self._pool is None else [self._pool.submit(work, k) for k in range(1, len(self._parts))]
-        try:
-            work(0)
-        finally:
-            for job in jobs:
-                job.result()
-
     def missions_of(self, rows: NDArray[np.int64], scenarios: Sequence[Scenario | None] | None = None) -> Missions:
         """Return what episodes of rows (k,) begin with: scenarios (k,), None being drawn from the row's own stream."""
-        count, listed = len(rows), rows.tolist()
+        count = len(rows)
         missions = Missions(np.empty((count, 4)), np.empty((count, 3)), np.empty((count, self._obstacles, 4)))
-        drawn = np.arange(count)
-        if scenarios is not None:
-            drawn = np.array([k for k in range(count) if scenarios[k] is None], np.int64)
-            for k, scenario in enumerate(scenarios):
-                if scenario is not None:
-                    _load(scenario, k, missions)
+        for k, scenario in enumerate(scenarios or ()):
+            if scenario is not None:
+                given = len(scenario.obstacles)
+                missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
+                missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
+                missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE
+        drawn = np.array([k for k in range(count) if scenarios is None or scenarios[k] is None], np.int64)
         if drawn.size:
-            self._draw([self.generators[listed[k]] for k in drawn], drawn, missions)
+            # one kernel call places all, the rare rest goes one by one
+            generators = [self.generators[row] for row in rows[drawn].tolist()]
+            numbers = np.stack([generator.random(first_numbers(self.draws)) for generator in generators])
+            solved = place_many(*self._prepared, numbers, drawn, *missions)
+            for i in np.flatnonzero(~solved).tolist():
+                start, goal, spheres = (array[drawn[i]] for array in missions)
+                draw(self.draws, self._prepared, generators[i], start, goal, spheres, numbers[i])
         return missions
 
     def begin(self, rows: NDArray[np.int64], missions: Missions, *, look: bool = True) -> None:
@@ -240,17 +222,6 @@ class EpisodeBatch:
             self.memory[rows, LEAST] = np.inf
             if look:
                 self.look(rows)
-
-    def _draw(self, generators: list[np.random.Generator], drawn: NDArray[np.int64], missions: Missions) -> None:
-        """Draw missions, each from its own stream: one kernel call places all, the rare rest goes one by one."""
-        numbers = np.empty((len(drawn), first_numbers(self.law)))
-        for generator, line in zip(generators, numbers):
-            generator.random(out=line)
-        solved = place_many(*self._prepared, numbers, drawn, *missions)
-        if not solved.all():
-            for i in np.flatnonzero(~solved).tolist():
-                start, goal, spheres = (array[drawn[i]] for array in missions)
-                draw(self.law, self._prepared, generators[i], start, goal, spheres, numbers[i])
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""
@@ -266,11 +237,3 @@ class EpisodeBatch:
     def render(self, row: int) -> NDArray[np.uint8] | None:
         """Return a new picture of a row (height, width, 3), or None if there is none or it is shown in a window."""
         return self.screen.render(row, self.episodes.rows, self.episodes.seen)
-
-
-def _load(scenario: Scenario, k: int, missions: Missions) -> None:
-    """Make a scenario the k-th mission, with nothing in the place of the spheres it lacks."""
-    given = len(scenario.obstacles)
-    missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
-    missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
-    missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE

@@ -1,6 +1,7 @@
 """`HydroneEnv`: one vehicle and one mission as a Gymnasium environment."""
 
 import copy
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -9,13 +10,13 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.envs.batch import EpisodeBatch
-from hydrone_gym.envs.info import conclude, info_of
+from hydrone_gym.envs.info import info_of
 from hydrone_gym.envs.options import Options, known_options, takes, with_options
-from hydrone_gym.envs.requests import check_running, check_scenario, load_reference, requested_scenario
+from hydrone_gym.envs.requests import load_reference, requested_scenario, reset_options
 from hydrone_gym.envs.reward import TERMS
-from hydrone_gym.envs.snapshot import Snapshot
 from hydrone_gym.envs.task import OUTCOME, Episodes
-from hydrone_gym.simulation.outcome import RUNNING
+from hydrone_gym.rendering.track import Track
+from hydrone_gym.simulation.outcome import GOAL, RUNNING, TIMEOUT, Outcome
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.generator import generate
@@ -26,6 +27,20 @@ __all__ = ["HydroneEnv", "known_options"]
 
 Observation = dict[str, NDArray[np.float64]] | NDArray[np.float32]
 _ONLY = np.zeros(1, np.int64)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Snapshot:
+    """What `HydroneEnv.get_state` returns: enough to go on bit for bit, picklable, sharing no memory with it."""
+
+    options: Options  # of the environment it was taken from; only such an environment can restore it
+    scenario: Scenario  # being flown
+    episodes: Episodes
+    transitions: tuple[dict[str, Any], ...]  # so far
+    random_state: dict[str, Any]  # of the bit generator that draws scenarios
+    seed: int | None  # that it was made from
+    egocentric: tuple[NDArray[np.float64], NDArray[np.float32]]  # memory and last observation, if that is the interface
+    track: Track | None  # flown so far, for pictures; None without `render_mode`
 
 
 class HydroneEnv(gym.Env[Any, Any]):
@@ -138,37 +153,30 @@ class HydroneEnv(gym.Env[Any, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Begin an episode; return observation and info, as in the class's description.
 
-        Args:
-            seed: seeds the random stream of scenarios.
-            options: {"scenario": Scenario, or the path of its JSON file} flies that one; it is not random then.
-
-        Raises:
-            ValueError: an unknown key, or a scenario that is impossible in this world.
+        `seed` is that of the stream of scenarios; options {"scenario": Scenario, or the path of its JSON file} fly that
+        one instead. Raises ValueError for an unknown key, or a scenario that is impossible in this world.
         """
         super().reset(seed=seed)
-        core, scenario = self._core, requested_scenario(options)
+        core, (chosen,) = self._core, reset_options(options, "scenario")
+        scenario = requested_scenario(chosen, self.simulation, core.sphere_space)
         if scenario is None:
-            scenario = generate(core.law, self.world, self.vehicle.radius, self.np_random)
-        else:
-            check_scenario(scenario, self.world, self.vehicle.radius, core.sphere_space)
+            scenario = generate(core.draws, self.world, self.vehicle.radius, self.np_random)
         core.begin(_ONLY, core.missions_of(_ONLY, [scenario]))
         self._scenario, self._outcome = scenario, RUNNING
         core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
         return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0])
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Fly one period with the reference moving to the action; returns are those of the class's description.
+        """Fly one period, the reference moving to the action (4,), m and rad; returns are as the class describes them.
 
-        Args:
-            action: (4,) x, y, z in m and psi in rad; clipped to the action space.
-
-        Raises:
-            ValueError: an action of another shape, or not finite.
-            ResetNeeded: before the first reset, or after the end of an episode.
+        Raises ValueError for an action of another shape or not finite, ResetNeeded without an episode that goes on.
         """
         core = self._core
         now, screen = core.episodes, core.screen
-        check_running(self._outcome)
+        if self._outcome != RUNNING:
+            ended = "" if self._outcome is None else Outcome(int(self._outcome)).name
+            when = f"after the episode ended with {ended}" if ended else "before reset()"
+            raise ResetNeeded(f"step() was called {when}: call reset() first")
         if core.egocentric is None:
             references = self._reference
             load_reference(action, core.low, core.high, references[0])
@@ -181,10 +189,11 @@ class HydroneEnv(gym.Env[Any, Any]):
         report = now.report[0].tolist()
         if report[-1] > 0.0:
             core.note_crossings(slice(0, 1))
-        self._outcome = report[OUTCOME]
-        info = info_of(report, core.transitions[0])
-        terminated, truncated = conclude(info)
-        return core.observation_of(0), report[len(TERMS)], terminated, truncated, info
+        self._outcome = outcome = report[OUTCOME]
+        info, truncated = info_of(report, core.transitions[0]), outcome == TIMEOUT
+        if outcome != RUNNING:
+            info["is_success"] = outcome == GOAL
+        return core.observation_of(0), report[len(TERMS)], outcome != RUNNING and not truncated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a new picture (height, width, 3), or None with a window; raises ResetNeeded before the first reset."""
@@ -215,7 +224,10 @@ class HydroneEnv(gym.Env[Any, Any]):
         """
         if not isinstance(snapshot, Snapshot):
             raise TypeError(f"snapshot must come from get_state(), got {type(snapshot).__name__}")
-        snapshot.check_options(self.options)
+        if differing := snapshot.options.differences(self.options):
+            pairs = [(name, getattr(snapshot.options, name), getattr(self.options, name)) for name in differing]
+            listed = ", ".join(f"{name} (snapshot {theirs!r}, here {own!r})" for name, theirs, own in pairs)
+            raise ValueError(f"snapshot is of an environment with other options: {listed}")
         core, self._scenario = self._core, snapshot.scenario
         self._outcome = float(snapshot.episodes.report[0, OUTCOME])
         own: list[np.ndarray] = [*core.episodes, core.memory, core.seen]

@@ -14,8 +14,8 @@ from hydrone_gym.simulation.storage import CROSSING_FIELDS, LOGGED_CROSSINGS
 
 _OUTCOMES = tuple(Outcome)
 _BATCH = ("outcome", "time", "energy", "clearance", "transitions", "reward_terms")
-_BATCH_MASKS = tuple(f"_{name}" for name in _BATCH)
-_TERM_MASKS = tuple(f"_{name}" for name in TERMS)
+_KEYS = (*_BATCH, *(f"_{name}" for name in _BATCH))
+_TERM_KEYS = (*TERMS, *(f"_{name}" for name in TERMS))
 
 
 def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -28,15 +28,6 @@ def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> d
         "transitions": [dict(crossing) for crossing in transitions],
         "reward_terms": dict(zip(TERMS, report)),
     }
-
-
-def conclude(info: dict[str, Any]) -> tuple[bool, bool]:
-    """Return whether an episode is terminated and whether truncated; at either end note `is_success` in its info."""
-    outcome = info["outcome"]
-    if outcome is Outcome.RUNNING:
-        return False, False
-    info["is_success"] = outcome is Outcome.GOAL
-    return outcome is not Outcome.TIMEOUT, outcome is Outcome.TIMEOUT
 
 
 def crossings_of(log: NDArray[np.float64], count: int) -> list[dict[str, Any]]:
@@ -55,19 +46,14 @@ def batch_info(
 ) -> dict[str, Any]:
     """Return `info` for many rows, arrays with their masks as Gymnasium's vector environments give them.
 
-    Args:
-        columns: (len(REPORT), n), not copied.
-        transitions: (n,) object, a list of crossings a row.
-        mask: (n,) which rows to fill in, the others are zero (None for objects); all unless given.
+    `columns` (len(REPORT), n) are not copied, `transitions` (n,) are objects, a list of crossings a row. Rows that the
+    `mask` (n,) leaves out are zero, None for objects.
     """
-    crossings, count = transitions.copy(), len(_BATCH) + len(TERMS)
-    if mask is None:
-        masks = np.ones((count, len(transitions)), bool)
-    else:
-        columns, masks = np.where(mask, columns, 0.0), np.repeat(mask[None], count, axis=0)
-        crossings[~mask] = None
-    terms: dict[str, Any] = dict(zip(TERMS, columns))
-    terms |= zip(_TERM_MASKS, masks)
-    values = (columns[OUTCOME].astype(np.int64), *columns[OUTCOME + 1 : OUTCOME + 4], crossings, terms)
-    info: dict[str, Any] = dict(zip(_BATCH, values, strict=True))
-    return info | dict(zip(_BATCH_MASKS, masks[len(TERMS) :], strict=True))
+    terms, crossings = len(TERMS), transitions.copy()
+    masks = np.ones((terms + len(_BATCH), len(transitions)), bool)
+    if mask is not None:
+        columns = np.where(mask, columns, 0.0)
+        masks[:], crossings[~mask] = mask, None
+    reward_terms: dict[str, Any] = dict(zip(_TERM_KEYS, (*columns[:terms], *masks[:terms])))
+    values = (columns[OUTCOME].astype(np.int64), *columns[OUTCOME + 1 : OUTCOME + 4], crossings, reward_terms)
+    return dict(zip(_KEYS, (*values, *masks[terms:]), strict=True))

@@ -26,11 +26,7 @@ _COUNT = len(TERMS)
 def write_reward(out, before, after, velocity, outcome):
     """Write the terms of a row in the order of `TERMS`, then their sum from left to right.
 
-    Args:
-        out: (K,) float64, K > len(TERMS).
-        before, after: time-to-go (s) at the beginning and at the end of the period.
-        velocity: (vx, vy, vz) in m/s at its end.
-        outcome: an `Outcome`.
+    Time-to-go (s) before and after the period, velocity (vx, vy, vz) in m/s and `Outcome` at its end.
     """
     vx, vy, vz = velocity
     slow = np.sqrt(vx * vx + vy * vy + vz * vz) < SLOW_SPEED

@@ -12,11 +12,10 @@ from hydrone_gym.envs.reward import TERMS, write_reward
 from hydrone_gym.perception.perceived import detect
 from hydrone_gym.simulation.advance import TICK
 from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
+from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.storage import new_rows
 from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
-from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.bodies import segment_distance
-from hydrone_gym.world.world import World
 
 # What is reported of each row, one column each.
 REPORT = (*TERMS, "reward", "outcome", "time", "energy", "clearance", "time_to_go", "crossings")
@@ -57,30 +56,17 @@ def new_episodes(count: int, obstacles: int, lanes: int) -> Episodes:
     )
 
 
-TASK = np.dtype(
-    [
-        ("first", np.int64),  # rows [first, last) are settled
-        ("last", np.int64),
-        ("lanes", np.int64),  # rows a block
-        ("radius", np.float64),  # m
-        ("sensor_range", np.float64),  # m
-        ("limit", np.float64),  # ticks after which a running episode times out
-        ("speeds", [(name, np.float64) for name in CruiseSpeeds._fields]),
-    ]
-)
+_COUNTS = [(name, np.int64) for name in ("first", "last", "lanes")]  # rows [first, last) are settled; rows a block
+_LIMITS = [(name, np.float64) for name in ("radius", "sensor_range", "limit")]  # m, m, ticks until a time-out
+TASK = np.dtype([*_COUNTS, *_LIMITS, ("speeds", [(name, np.float64) for name in CruiseSpeeds._fields])])
 
 
-def pack_task(vehicle: Vehicle, world: World, time_limit: float, lanes: int, part: slice) -> np.ndarray:
+def pack_task(simulation: Simulation, time_limit: float, part: slice) -> np.ndarray:
     """Return the constants of a task with a time limit in s, for a part of the rows: one record (1,), dtype `TASK`."""
-    limit, speeds = math.ceil(time_limit / TICK - 1e-9), tuple(cruise_speeds(envelope_of(vehicle)))
-    return np.array([(part.start, part.stop, lanes, vehicle.radius, world.sensor_range, limit, speeds)], TASK)
-
-
-@inlined
-def _potential_of(row, speeds):
-    """Time-to-go (s) of a row."""
-    s, goal = row.state, row.goal
-    return time_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], speeds)
+    vehicle, ticks = simulation.vehicle, math.ceil(time_limit / TICK - 1e-9)
+    limits = vehicle.radius, simulation.world.sensor_range, ticks
+    speeds = tuple(cruise_speeds(envelope_of(vehicle, simulation.law)))
+    return np.array([(part.start, part.stop, simulation.lanes, *limits, speeds)], TASK)
 
 
 @inlined
@@ -120,29 +106,22 @@ def _surround(now, n, missions, k, params):
 @inlined
 def _judge(now, n, params):
     """Judge row n after a period: time-out, reward, and what is reported."""
-    row, report = now.rows[n], now.report
+    row, report = now.rows[n], now.report[n]
     if row.outcome == RUNNING and row.ticks >= params.limit:
         row.outcome = TIMEOUT
-    s = row.state
-    after = _potential_of(row, params.speeds)
-    write_reward(report[n], report[n, OUTCOME + 4], after, (s[6], s[7], s[8]), row.outcome)
-    report[n, OUTCOME] = row.outcome
-    report[n, OUTCOME + 1] = row.ticks * TICK
-    report[n, OUTCOME + 2] = row.energy
-    report[n, OUTCOME + 3] = row.clearance
-    report[n, OUTCOME + 4] = after
-    report[n, OUTCOME + 5] = row.crossings
+    s, goal = row.state, row.goal
+    after = time_to_go(s[0], s[1], s[2], goal[0], goal[1], goal[2], params.speeds)
+    write_reward(report, report[OUTCOME + 4], after, (s[6], s[7], s[8]), row.outcome)
+    report[OUTCOME], report[OUTCOME + 1], report[OUTCOME + 2] = row.outcome, row.ticks * TICK, row.energy
+    report[OUTCOME + 3], report[OUTCOME + 4], report[OUTCOME + 5] = row.clearance, after, row.crossings
     row.crossings = 0.0
 
 
 @kernel
 def settle(rows, obstacles, closest, seen, found, known, report, values):
-    """Settle a part of the rows after a period: reward, sensing, report.
+    """Settle a part of the rows after a period: reward, sensing, report; `values` are from `pack_task`.
 
-    Args:
-        rows, obstacles, closest, seen, found, known, report: `Episodes`, updated; one by one they reach a kernel in
-            half the time that the tuple takes. The crossings reported are those of this period.
-        values: from `pack_task`.
+    `Episodes` is updated; one by one its arrays reach a kernel in half the time that the tuple takes.
     """
     now, params = Episodes(rows, obstacles, closest, seen, found, known, report), values[0]
     for n in range(params.first, params.last):
@@ -154,18 +133,13 @@ def settle(rows, obstacles, closest, seen, found, known, report, values):
 def begin_rows(now, missions, order, values):
     """Begin episodes: at rest at their starts, with nothing known but what is in range there, no reward earned yet.
 
-    Args:
-        now: `Episodes`, written.
-        missions: `Missions`, one each.
-        order: (k,) int64, which rows.
-        values: from `pack_task`.
+    Mission k of `Missions` is that of row order[k], int64, of the `Episodes`; `values` are from `pack_task`.
     """
     params = values[0]
     for k in range(order.size):
         n = order[k]
         _place_row(now.rows[n], missions, k)
         _surround(now, n, missions, k, params)
-        now.report[n, OUTCOME + 4] = _potential_of(now.rows[n], params.speeds)
         _judge(now, n, params)
         for term in range(OUTCOME):
             now.report[n, term] = 0.0

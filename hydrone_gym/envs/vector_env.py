@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from hydrone_gym.envs.batch import EpisodeBatch, ReferenceFilter
 from hydrone_gym.envs.info import batch_info
 from hydrone_gym.envs.options import VectorOptions, takes, with_options
-from hydrone_gym.envs.requests import check_scenario, requested_rows
+from hydrone_gym.envs.requests import requested_rows, requested_scenario, reset_options
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import OUTCOME
 from hydrone_gym.simulation.outcome import GOAL, RUNNING, TIMEOUT
@@ -46,11 +46,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     drawn; `reset_mask` (n,) bool, which rows to reset.
     """
 
-    metadata: dict[str, Any] = {
-        "render_modes": ["rgb_array"],
-        "render_fps": 2,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 2, "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     @takes(VectorOptions)
     def __init__(self, options: VectorOptions) -> None:
@@ -83,32 +79,31 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes in all rows, or in those of ``options["reset_mask"]``.
+        """Begin episodes in all rows, or in those of ``options["reset_mask"]``; the class describes `options`.
 
-        Args:
-            seed: row i is seeded with ``seed + i``, or with its entry of a sequence; None goes on with its stream.
-            options: see the class.
-
-        Raises:
-            ValueError, TypeError: an unknown option, a wrong mask, an impossible scenario.
+        Row i is seeded with ``seed + i``, or with its entry of a sequence; None goes on with its stream. Raises
+        ValueError or TypeError for an unknown option, a wrong mask or an impossible scenario.
         """
-        (rows, scenarios), simulation = requested_rows(options, self.num_envs), self.simulation
-        for scenario in scenarios:
-            if scenario is not None:
-                check_scenario(scenario, simulation.world, simulation.vehicle.radius, self._core.sphere_space)
+        chosen, mask = reset_options(options, "scenario", "reset_mask")
+        rows = requested_rows(mask, self.num_envs)
+        bounds, several = self._core.sphere_space, isinstance(chosen, list | tuple)
+        if several and len(chosen) != self.num_envs:
+            raise ValueError(f"scenario must be one scenario or a sequence of {self.num_envs}, got {len(chosen)}")
+        asked = [chosen[row] for row in rows] if several else [chosen]
+        scenarios = [requested_scenario(each, self.simulation, bounds) for each in asked]
+        scenarios = scenarios if several else scenarios * len(rows)
         self._seed(seed, rows)
         self._core.begin(rows, self._core.missions_of(rows, scenarios))
         if self.render_mode is not None:
             self._core.show(rows)
-        mask = np.zeros(self.num_envs, bool)
-        mask[rows] = True
         observation = self._core.new_observation()
         self._core.observe(slice(0, self.num_envs), observation)
-        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, mask)
+        begun = np.isin(np.arange(self.num_envs), rows)
+        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, begun)
 
-    def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
+    def _seed(self, seed: Any, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not _many(seed) else list(seed)  # type: ignore[arg-type, operator]
+        seeds = seed if np.ndim(seed) else [None if seed is None else seed + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
         streams = self._core.generators
@@ -121,17 +116,10 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     def step(
         self, actions: ArrayLike
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Fly one period in every row.
+        """Fly one period in every row with actions (n, 4), m and rad, clipped to the action space.
 
-        Args:
-            actions: (n, 4) references, m and rad; clipped to the action space.
-
-        Returns:
-            Observation, rewards, terminations, truncations (n,) and info.
-
-        Raises:
-            ValueError: actions of another shape or not finite; nothing has moved then.
-            ResetNeeded: before the first reset; in "Disabled" mode also with rows that have ended.
+        Raises ValueError for actions of another shape or not finite, nothing has moved then, and ResetNeeded before the
+        first reset, in "Disabled" mode also with rows that have ended.
         """
         core, same_step = self._core, self._mode == AutoresetMode.SAME_STEP
         if not core.generators:
@@ -150,26 +138,19 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         truncated, ended = outcome == TIMEOUT, outcome != RUNNING
         info = batch_info(flown.now, core.transitions)
         if ended.any():
-            success = {"is_success": outcome == GOAL, "_is_success": ended.copy()}
+            last = {"is_success": outcome == GOAL, "_is_success": ended.copy()}
             if same_step:
-                last = batch_info(flown.report, flown.last_transitions, ended) | success
-                success = {"final_obs": flown.last_observations, "_final_obs": ended.copy()}
-                success |= {"final_info": last, "_final_info": ended.copy()}
-            info |= success
+                last |= batch_info(flown.report, flown.last_transitions, ended)
+                last = {"final_info": last, "_final_info": ended.copy(), "final_obs": flown.last_observations}
+                last["_final_obs"] = ended.copy()
+            info |= last
         return flown.observation, flown.report[_REWARD].copy(), ended & ~truncated, truncated, info
 
     def render(self) -> tuple[RenderFrame, ...] | None:
-        """Return a new picture (height, width, 3) of each row, None without a `render_mode`.
-
-        Raises ResetNeeded before the first reset.
-        """
+        """Return a new picture (height, width, 3) of each row, None without `render_mode`; ResetNeeded before reset."""
         first = self._core.render(0)
         rest: Any = (self._core.render(row) for row in range(1, self.num_envs))
         return None if first is None else (first, *rest)
 
 
 HydroneVectorEnv.__doc__ = with_options(HydroneVectorEnv.__doc__, VectorOptions)
-
-
-def _many(seed: Any) -> bool:
-    return seed is not None and not isinstance(seed, int | np.integer)

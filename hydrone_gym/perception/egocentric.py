@@ -40,45 +40,40 @@ yaw reference is unused, it is the heading of the moment, so that the vehicle do
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.perception.rays import FIXED, RAY_NAMES, cast_along, cast_fixed, leave_box
-from hydrone_gym.perception.relative import mission_frame, pack_egocentric, place_references
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import new_rows
-from hydrone_gym.simulation.time_to_go import time_to_go
+from hydrone_gym.simulation.time_to_go import CruiseSpeeds, cruise_speeds, time_to_go
 from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
 
 RawObservation = Mapping[str, NDArray]
 
-LIMIT = 5.0  # of every entry
+LIMIT = 5.0  # of every entry of an observation
+STEP = (2.0, 2.0, 1.5)  # m along x', y', z at full action: 3.2 m at most, about as far as the vehicle senses
+MARGIN = 0.2  # m: the nearest a reference comes to the box
 
-_AXES = ("ahead", "left", "up")
-NAMES = (
-    *(f"goal_{axis}" for axis in _AXES),
-    *(f"goal_near_{axis}" for axis in _AXES),
-    "height",
-    *(f"velocity_{axis}" for axis in _AXES),
-    "roll",
-    "pitch",
-    "sin_yaw",
-    "cos_yaw",
-    *(f"reference_{axis}" for axis in _AXES),
-    "medium",
-    "zone",
-    *(f"wall_{side}" for side in ("ahead", "behind", "left", "right", "up", "down")),
-    "goal_horizontal",
-    "goal_vertical",
-    *RAY_NAMES,
-    "clock",
-)
+_BOX = [(name, np.float64) for name in ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max", "zone", "radius")]  # m
+EGOCENTRIC = np.dtype([*_BOX, ("speeds", [(name, np.float64) for name in CruiseSpeeds._fields])])
+
+
+def _axes(word: str) -> list[str]:
+    return [f"{word}_{axis}" for axis in ("ahead", "left", "up")]
+
+
+_VEHICLE = ("height", *_axes("velocity"), "roll", "pitch", "sin_yaw", "cos_yaw", *_axes("reference"), "medium", "zone")
+_WALLS = [f"wall_{side}" for side in ("ahead", "behind", "left", "right", "up", "down")]
+_WAYS = (*_WALLS, "goal_horizontal", "goal_vertical", *RAY_NAMES)
+NAMES = (*_axes("goal"), *_axes("goal_near"), *_VEHICLE, *_WAYS, "clock")
 OBSERVATION_SIZE = len(NAMES)
 _RAYS = NAMES.index(RAY_NAMES[0])
 _CLOCK = NAMES.index("clock")
@@ -98,6 +93,34 @@ class Memory(NamedTuple):
     start: NDArray[np.float64]  # (3,) where the episode started, m
     least: NDArray[np.float64]  # () least time-to-go so far, s; infinity: an episode begins
     clock: NDArray[np.float64]  # () periods since it last fell
+
+
+def pack_egocentric(vehicle: Vehicle, world: World, law: str = "paper") -> np.ndarray:
+    """Return the constants of the interface as one record (1,), dtype `EGOCENTRIC`."""
+    speeds = tuple(cruise_speeds(envelope_of(vehicle, law)))
+    return np.array([(*world.lower, *world.upper, world.zone, vehicle.radius, speeds)], EGOCENTRIC)
+
+
+@inlined
+def mission_frame(start_x, start_y, goal_x, goal_y):
+    """Cosine and sine of the azimuth of x'; of the world's x where start and goal (m) give none."""
+    dx, dy = goal_x - start_x, goal_y - start_y
+    length = np.sqrt(dx * dx + dy * dy)
+    level = 1e-6 <= length < np.inf
+    return (dx / length if level else 1.0), (dy / length if level else 0.0)
+
+
+@inlined
+def _inside(value, low, high):
+    """Keep a coordinate (m) MARGIN inside two walls, as float32 would; NaN stays NaN."""
+    low, high = low + MARGIN, high - MARGIN
+    return np.float64(np.float32(low if value < low else (high if value > high else value)))
+
+
+@inlined
+def _unit(value):
+    """Clip to [-1, 1]; NaN stays NaN."""
+    return -1.0 if value < -1.0 else (1.0 if value > 1.0 else value)
 
 
 @inlined
@@ -150,14 +173,9 @@ def _remember(memory, state, goal, speeds):
 
 @kernel
 def observe_rows(told, obstacles, found, memory, order, values, seen):
-    """Write observations and move their memory on: once a period, neither more nor less.
+    """Write observations of rows `order` (k,), int64, of a `Perceived`, and move their memory on: once a period.
 
-    Args:
-        told, obstacles, found: fields of a `Perceived`.
-        memory: (n, 5) a `Memory` a row, updated.
-        order: (k,) int64, which rows.
-        values: from `pack_egocentric`.
-        seen: (n, OBSERVATION_SIZE) float32, those rows written.
+    `memory` (n, 5) holds a `Memory` a row, `seen` is (n, OBSERVATION_SIZE), float32.
     """
     params = values[0]
     for k in range(order.size):
@@ -175,33 +193,36 @@ def observe_rows(told, obstacles, found, memory, order, values, seen):
         out[_CLOCK] = _clip(_PERIODS * own[LEAST + 1])
 
 
+@kernel
+def place_references(told, actions, memory, values, out):
+    """Write the references (n, 4), in m, m, m, rad and every number a float32, of relative actions (n, 3), float32.
+
+    `told` is of a `Perceived`, `memory` (n, 3 or more) where the episodes started, x, y, z in m.
+    """
+    p = values[0]
+    for n in range(out.shape[0]):
+        row = told[n]
+        s, goal = row.state, row.goal
+        cosine, sine = mission_frame(memory[n, 0], memory[n, 1], goal[0], goal[1])
+        ahead = STEP[0] * _unit(np.float64(actions[n, 0]))
+        left = STEP[1] * _unit(np.float64(actions[n, 1]))
+        out[n, 0] = _inside(s[0] + (cosine * ahead - sine * left), p.x_min, p.x_max)
+        out[n, 1] = _inside(s[1] + (sine * ahead + cosine * left), p.y_min, p.y_max)
+        out[n, 2] = _inside(s[2] + STEP[2] * _unit(np.float64(actions[n, 2])), p.z_min, p.z_max)
+        out[n, 3] = np.float64(np.float32(row.reference[3] if is_air(s[2]) else s[5]))
+
+
 def new_memory(count: int) -> NDArray[np.float64]:
-    """Return (n, 5) a `Memory` a row, of episodes that begin: start, least and clock."""
+    """Return (n, 5) a `Memory` a row, of episodes that begin."""
     return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
-class Modelled(Protocol):
-    """A belief, a simulation, or anything else that has a vehicle and a world."""
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The vehicle."""
-
-    @property
-    def world(self) -> World:
-        """The world."""
-
-
 class Egocentric:
-    """Sees and acts as `interface="egocentric"` does: for environments, and through the raw interface, bit for bit.
+    """Sees and acts as `interface="egocentric"` does: for environments, and through the raw interface, bit for bit."""
 
-    Args:
-        model: what a policy believes; only its vehicle and world are read.
-    """
-
-    def __init__(self, model: Modelled) -> None:
-        """Pack the constants."""
-        self.values = pack_egocentric(model.vehicle, model.world)
+    def __init__(self, model: Any) -> None:
+        """Pack what is believed: a model's vehicle, world and, if it has one, law."""
+        self.values = pack_egocentric(model.vehicle, model.world, getattr(model, "law", "paper"))
 
     def look(
         self, perceived: Perceived, memory: NDArray[np.float64], rows: NDArray[np.int64], seen: NDArray[np.float32]
@@ -220,18 +241,10 @@ class Egocentric:
     def observe(
         self, observation: RawObservation, memory: Memory | None = None, starting: ArrayLike | None = None
     ) -> tuple[NDArray[np.float32], Memory]:
-        """Return the flat observation and the new memory; call it once a period. Nothing given is changed or shared.
+        """Return the flat observation, (68,) or (n, 68), and the new memory; call it once a period.
 
-        Args:
-            observation: raw Dict observation, single or batched along the first axis.
-            memory: what the last call returned; None where all episodes begin.
-            starting: () or (n,) True where an episode begins: that memory is dropped.
-
-        Returns:
-            (68,) or (n, 68) float32, and the `Memory`.
-
-        Raises:
-            ValueError: a missing key or a wrong shape.
+        `memory` is what the last call returned, None where all episodes begin; it is dropped where `starting`, () or
+        (n,), is True. Nothing given is changed or shared. Raises ValueError for a missing key or a wrong shape.
         """
         perceived, single = _load(observation)
         count = len(perceived.told)
@@ -250,13 +263,8 @@ class Egocentric:
     def reference(self, action: ArrayLike, observation: RawObservation, memory: Memory) -> NDArray[np.float32]:
         """Return the raw action, (4,) or (n, 4) float32 in m, m, m, rad, that a relative action stands for.
 
-        Args:
-            action: (3,) or (n, 3) in [-1, 1], clipped to it; read as float32.
-            observation: the raw observation it answers.
-            memory: what `observe` returned for that observation.
-
-        Raises:
-            ValueError: a missing key, a wrong shape, or an action that is not finite.
+        `action` is (3,) or (n, 3), clipped to [-1, 1]; `memory` is what `observe` returned for the observation. Raises
+        ValueError for a missing key, a wrong shape, or an action that is not finite.
         """
         perceived, single = _load(observation)
         count = len(perceived.told)
@@ -270,8 +278,7 @@ class Egocentric:
 
 def _shaped(name: str, given: ArrayLike, shape: tuple[int, ...], single: bool) -> NDArray[np.float64]:
     """Check an array against (n, ...), or (...) for a single one, and return it as (n, ...) float64."""
-    array = np.asarray(given, np.float64)
-    wanted = shape[1:] if single else shape
+    array, wanted = np.asarray(given, np.float64), shape[1:] if single else shape
     if array.shape != wanted:
         raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
     return array.reshape(shape)

@@ -54,23 +54,17 @@ class Perceived(NamedTuple):
 def perceive(rows: np.ndarray, known: NDArray[np.float64], found: NDArray[np.int64]) -> Perceived:
     """Return what perfect senses tell of rows (n,), dtype `ROW`: the truth, in the very same memory.
 
-    Args:
-        rows: the vehicles.
-        known, found: spheres (n, M, 4) in m that `detect` keeps, and their number (n,).
+    `known` (n, M, 4) and `found` (n,) are the spheres that `detect` keeps, and their number.
     """
     return Perceived(rows[list(TOLD)], known, found)
 
 
 @inlined
 def detect(now, n, lanes, sensor_range):
-    """Append what row n has newly detected to its list of known spheres, ties of one period by index.
+    """Append what row n has newly detected, within `sensor_range` (m), to its known spheres, ties of a period by index.
 
-    Args:
-        now: has the row's block of `obstacles` and `closest`, lane-major as in the simulation, and `seen` (rows, M), 1
-            for a detected obstacle, `found` (rows,) and `known` (rows, M, 4), which are updated; m.
-        n: which row.
-        lanes: rows a block.
-        sensor_range: distance (m) at which a surface is detected.
+    `now` has `obstacles` and `closest`, `lanes` rows a block as in the simulation, and `seen` (rows, M), 1 if detected,
+    `found` (rows,) and `known` (rows, M, 4), which are updated; all in m.
     """
     block, lane = n // lanes, n % lanes
     for j in range(now.seen.shape[1]):

@@ -20,10 +20,8 @@ STILL = 1e-3  # m/s, and m to the goal: below it there is no direction to look a
 def _fixed_directions() -> np.ndarray:
     """Unit vectors (3, 38) in the mission frame: each elevation all round, then up and down."""
     around = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-    rings = [
-        np.stack([math.cos(e) * np.cos(around), math.cos(e) * np.sin(around), np.full(AZIMUTHS, math.sin(e))])
-        for e in map(math.radians, ELEVATIONS)
-    ]
+    circle = np.stack([np.cos(around), np.sin(around), np.ones(AZIMUTHS)])
+    rings = [np.array([[math.cos(e)], [math.cos(e)], [math.sin(e)]]) * circle for e in map(math.radians, ELEVATIONS)]
     rays = np.concatenate([*rings, [[0.0, 0.0], [0.0, 0.0], [1.0, -1.0]]], axis=1)
     return np.where(abs(rays) < 1e-12, 0.0, rays)  # the cosine of a right angle: a ray along a wall must not leave
 
@@ -31,13 +29,8 @@ def _fixed_directions() -> np.ndarray:
 # Kernels read the three rows as constants.
 _X, _Y, _Z = (np.ascontiguousarray(row) for row in _fixed_directions())
 FIXED = _X.size
-RAY_NAMES = (
-    *(f"ray_{e:+d}_{360 * k // AZIMUTHS}" for e in ELEVATIONS for k in range(AZIMUTHS)),
-    "ray_up",
-    "ray_down",
-    "ray_goal",
-    "ray_velocity",
-)
+_RINGS = [f"ray_{e:+d}_{360 * k // AZIMUTHS}" for e in ELEVATIONS for k in range(AZIMUTHS)]
+RAY_NAMES = (*_RINGS, "ray_up", "ray_down", "ray_goal", "ray_velocity")
 
 
 @inlined
@@ -69,15 +62,10 @@ def share_of_reach(distance):
 
 @inlined
 def cast_fixed(out, first, place, frame, spheres, count, params):
-    """Write the fixed rays of a row, as shares of the reach, to out[first : first + FIXED].
+    """Write the fixed rays of a row, as shares of the reach, to out[first : first + FIXED], float32.
 
-    Args:
-        out: (K,) float32; its own columns hold the least so far, since rounding keeps the order.
-        first: column of the first ray.
-        place: (x, y, z), m.
-        frame: cosine and sine of the mission frame's azimuth.
-        spheres, count: (M, 4) x, y, z, r in m, and how many of them count.
-        params: has the box, x_min ... z_max, and the vehicle's radius (m).
+    These columns hold the least so far, since rounding keeps the order. `place` (x, y, z) in m; `frame` from
+    `mission_frame`; the first `count` of the spheres (M, 4) in m are known; `params` has the box and the radius (m).
     """
     cosine, sine = frame
     for k in range(FIXED):

@@ -40,7 +40,7 @@ class Screen:
         if mode is not None:  # what is heavy is imported by environments that are drawn
             from hydrone_gym.rendering.frame import Painter
 
-            self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period)
+            self._simulation = Simulation(simulation.vehicle, simulation.world, simulation.period, law=simulation.law)
             self._painter = Painter(view, simulation.world, simulation.vehicle)
             self._window = Window(view.size) if mode == "human" else None
 

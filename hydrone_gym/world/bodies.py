@@ -26,13 +26,7 @@ def inverse_square(dx, dy, dz):
 
 @inlined
 def path_distance(a, d, inverse, body):
-    """Least distance (m) from the straight path that leads from point a by d to the surface of a body.
-
-    Args:
-        a, d: (x, y, z), m.
-        inverse: `inverse_square` of d.
-        body: (x, y, z, r), m.
-    """
+    """Least distance (m) from the path a to a + d (x, y, z in m) to a body; `inverse` is `inverse_square` of d."""
     ox, oy, oz = body[0] - a[0], body[1] - a[1], body[2] - a[2]
     t = (ox * d[0] + oy * d[1] + oz * d[2]) * inverse
     t = t if t > 0.0 else 0.0
@@ -52,9 +46,8 @@ def segment_distance(a, b, body):
 def meet_ray(along, power):
     """Distance (m) along a ray to a sphere: 0 inside it, infinity if missed.
 
-    Args:
-        along: component (m) of the sphere's centre along the ray.
-        power: squared distance of its centre less its squared radius (m^2), negative inside.
+    `along` is the component (m) of its centre along the ray, `power` the squared distance of its centre less its
+    squared radius (m²), negative inside.
     """
     discriminant = along * along - power
     t = along - np.sqrt(discriminant if discriminant > 0.0 else 0.0)
@@ -63,12 +56,7 @@ def meet_ray(along, power):
 
 
 def gaps_along(a: NDArray[np.float64], b: NDArray[np.float64], bodies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least distances (M,) in m from the straight path between two points (3,) to the surfaces of bodies.
-
-    Args:
-        a, b: ends of the path, m.
-        bodies: (M, 4) x, y, z, r in m.
-    """
+    """Return the least distances (M,) in m from the straight path between two points (3,) to the surfaces of bodies."""
     along, offset = b - a, bodies[:, :3] - a
     share = np.clip(offset @ along / max(float(along @ along), sys.float_info.min), 0.0, 1.0)
     return np.linalg.norm(offset - share[:, None] * along, axis=1) - bodies[:, 3]

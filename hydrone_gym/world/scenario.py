@@ -5,7 +5,7 @@ import math
 import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -17,29 +17,27 @@ VERSION = 1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
-    """One mission in a world of spheres.
+    """One mission in a world of spheres; equal by value and hashable.
 
-    Attributes:
-        start: x, y, z in m and yaw in rad at which the vehicle starts at rest.
-        goal: x, y, z in m.
-        obstacles: (M, 4) read-only float64 array, a sphere [x, y, z, r] in m a row; any nested sequence is copied.
-        name: what to call it in tables; counts as part of the value.
-
-    Scenarios are equal by value and hashable. Only shapes are checked here, see `validate` for the rules of a world.
-
-    Raises:
-        ValueError: a field of the wrong shape or with entries that are no numbers.
+    Raises ValueError for a wrong shape or what is no number; `validate` knows the rules of a world.
     """
 
-    start: tuple[float, float, float, float]
-    goal: tuple[float, float, float]
-    obstacles: np.ndarray
-    name: str = ""
+    start: tuple[float, float, float, float]  #: x, y, z in m and yaw in rad, where the vehicle starts at rest
+    goal: tuple[float, float, float]  #: x, y, z in m
+    obstacles: np.ndarray  #: (M, 4) read-only float64, a sphere [x, y, z, r] in m a row; any nested sequence is copied
+    name: str = ""  #: what to call it in tables; counts as part of the value
 
     def __post_init__(self) -> None:
         """Bring every field to its one form: tuples of float, and an own read-only array."""
-        object.__setattr__(self, "start", _numbers("start", self.start, 4))
-        object.__setattr__(self, "goal", _numbers("goal", self.goal, 3))
+        for name, length, unit in (("start", 4, "x, y, z in m and yaw in rad"), ("goal", 3, "x, y, z in m")):
+            try:
+                numbers = tuple(map(float, getattr(self, name)))
+            except (TypeError, ValueError):
+                numbers = ()
+            if len(numbers) != length:
+                given = getattr(self, name)
+                raise ValueError(f"Scenario.{name} must hold {length} numbers ({unit}), got {given!r}")
+            object.__setattr__(self, name, numbers)
         try:
             obstacles = np.array(self.obstacles, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
@@ -69,21 +67,8 @@ class Scenario:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore after pickling or copying, which forget that the array is read-only."""
-        for name, value in state.items():
-            object.__setattr__(self, name, value)
+        self.__dict__.update(state)
         self.obstacles.flags.writeable = False
-
-
-def _numbers(name: str, value: Any, length: int) -> tuple[Any, ...]:
-    """Turn a sequence of numbers into a tuple of float."""
-    try:
-        numbers = tuple(map(float, value))
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) != length:
-        unit = "x, y, z in m and yaw in rad" if length == 4 else "x, y, z in m"
-        raise ValueError(f"Scenario.{name} must hold {length} numbers ({unit}), got {value!r}")
-    return numbers
 
 
 def check_end(name: str, position: tuple[float, ...], world: World) -> None:
@@ -102,10 +87,9 @@ def check_radius(vehicle_radius: float) -> None:
 
 
 def validate(scenario: Scenario, world: World, vehicle_radius: float) -> None:
-    """Check that a vehicle of this radius (m) can start in the scenario and rest at its goal.
+    """Raise ValueError unless a vehicle of this radius (m) can start in the scenario and rest at its goal.
 
-    Raises ValueError naming the thing, the rule, the unit and the value when an end lies outside the box, inside the
-    transition zone or too near a sphere, or when a number is not finite or a sphere's radius is not positive.
+    Ends lie in the box, outside the transition zone and clear of every sphere; numbers are finite, radii positive.
     """
     check_radius(vehicle_radius)
     check_end("start", scenario.start[:3], world)
@@ -131,14 +115,7 @@ def save_scenario(scenario: Scenario, path: str | Path) -> None:
 
     Raises ValueError naming the path for a number that is not finite, and OSError when the file cannot be written.
     """
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "name": scenario.name,
-        "start": scenario.start,
-        "goal": scenario.goal,
-        "obstacles": scenario.obstacles.tolist(),
-    }
+    content = {"format": FORMAT, "version": VERSION, **vars(scenario), "obstacles": scenario.obstacles.tolist()}
     try:
         text = json.dumps(content, indent=1, allow_nan=False)
     except ValueError:
@@ -160,7 +137,7 @@ def load_scenario(path: str | Path) -> Scenario:
 def _parse(text: str) -> Scenario:
     """Turn the text of a scenario file into a scenario; ValueError says what is wrong."""
     try:
-        content = json.loads(text, parse_constant=_reject_constant)
+        content = json.loads(text)
     except json.JSONDecodeError as error:
         raise ValueError(f"not complete JSON: {error}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -171,23 +148,12 @@ def _parse(text: str) -> Scenario:
     for problem, keys in (("missing", known - content.keys()), ("unknown", content.keys() - known)):
         if keys:
             raise ValueError(f"{problem} key {', '.join(map(repr, sorted(keys)))}")
-    _check_row("start", content["start"], 4)
-    _check_row("goal", content["goal"], 3)
     if not isinstance(content["obstacles"], list):
         raise ValueError(f"obstacles must be a list, got {content['obstacles']!r}")
-    for index, row in enumerate(content["obstacles"]):
-        _check_row(f"obstacle {index}", row, 4)
+    rows = [("start", content["start"], 4), ("goal", content["goal"], 3)]
+    for name, row, length in rows + [(f"obstacle {k}", row, 4) for k, row in enumerate(content["obstacles"])]:
+        numbers = isinstance(row, list) and len(row) == length and all(type(entry) in (int, float) for entry in row)
+        # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
+        if not numbers or not all(abs(entry) <= sys.float_info.max for entry in row):
+            raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
     return Scenario(**{key: content[key] for key in known - {"format", "version"}})
-
-
-def _check_row(name: str, row: Any, length: int) -> None:
-    """Raise ValueError unless a value read from JSON is a list of so many finite numbers."""
-    numbers = isinstance(row, list) and len(row) == length and all(type(entry) in (int, float) for entry in row)
-    # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
-    if not numbers or not all(abs(entry) <= sys.float_info.max for entry in row):
-        raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
-
-
-def _reject_constant(constant: str) -> NoReturn:
-    """Refuse the NaN and Infinity that JSON does not have but Python reads."""
-    raise ValueError(f"numbers must be finite, got {constant}")

@@ -21,15 +21,9 @@ _SPACE = np.dtype([("lower", "f8", 3), ("upper", "f8", 3), ("zone", "f8"), ("inf
 # Where a simple route bends: share of the way from start to goal, lateral offset (m), lift (m, within one medium only).
 # The first is the straight route, crossing at 65 % of the way as the paper's flights do; wide detours come next because
 # they share the fewest spheres with it.
-_BENDS = np.array(
-    [(0.65, 0.0, 0.0)]
-    + [
-        (share, sign * side, lift)
-        for side in (4.0, 7.0, 2.0)
-        for share, lift in ((0.25, 0.0), (0.8, -1.5), (0.5, 1.5))
-        for sign in (1.0, -1.0)
-    ]
-)
+_PLACES = [(0.25, 0.0), (0.8, -1.5), (0.5, 1.5)]
+_SIDES = [(share, side, lift) for wide in (4.0, 7.0, 2.0) for share, lift in _PLACES for side in (wide, -wide)]
+_BENDS = np.array([(0.65, 0.0, 0.0), *_SIDES])
 
 
 def flight_space(world: World, vehicle_radius: float) -> np.ndarray:
@@ -89,15 +83,13 @@ def has_simple_route(space, start, goal, obstacles):
 @inlined
 def _cell(value, low, size, count):
     """Index of the cell that holds a coordinate, limited to the cells of the box; cell 0 is the wall."""
-    index = np.floor((value - low) / size) + 1.0
-    if index < 1.0:
-        return 1
-    return int(index) if index < count else count
+    return int(min(max(np.floor((value - low) / size) + 1.0, 1.0), count))
 
 
 @inlined
-def _block(free, obstacles, inflation, low, dx, dy, dz, nx, ny, nz):
-    """Take every cell out of the flat grid whose centre lies within an inflated sphere."""
+def _block(free, obstacles, inflation, low, grid):
+    """Take every cell out of the flat grid whose centre lies within an inflated sphere; grid: cell edges and counts."""
+    (dx, dy, dz), (nx, ny, nz) = grid
     for m in range(obstacles.shape[0]):
         x, y, z = obstacles[m, 0] - low[0], obstacles[m, 1] - low[1], obstacles[m, 2] - low[2]
         reach = obstacles[m, 3] + inflation
@@ -128,7 +120,7 @@ def has_grid_route(space, start, goal, obstacles):
         for j in range(1, ny + 1):
             for k in range(1, nz + 1):
                 free[i * plane + j * row + k] = 1
-    _block(free, obstacles, space[0].inflation, low, dx, dy, dz, nx, ny, nz)
+    _block(free, obstacles, space[0].inflation, low, ((dx, dy, dz), (nx, ny, nz)))
     here = _cell(start[0], low[0], dx, nx) * plane + _cell(start[1], low[1], dy, ny) * row
     here += _cell(start[2], low[2], dz, nz)
     end = _cell(goal[0], low[0], dx, nx) * plane + _cell(goal[1], low[1], dy, ny) * row
@@ -170,7 +162,7 @@ def is_solvable(scenario: Scenario, world: World, vehicle_radius: float) -> bool
     ValueError when the vehicle cannot be at the start or at the goal, see `hydrone_gym.world.scenario.validate`.
     """
     validate(scenario, world, vehicle_radius)
-    space = flight_space(world, vehicle_radius)
     # Writable arrays, as in a draw: the kernels have one compiled version.
-    ends = np.array(scenario.start), np.array(scenario.goal), np.array(scenario.obstacles)
-    return has_simple_route(space, *ends) or has_grid_route(space, *ends)
+    mission = np.array(scenario.start), np.array(scenario.goal), np.array(scenario.obstacles)
+    space = flight_space(world, vehicle_radius)
+    return has_simple_route(space, *mission) or has_grid_route(space, *mission)

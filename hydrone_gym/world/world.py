@@ -27,47 +27,31 @@ class WorldParams(NamedTuple):
 class World:
     """The box the vehicle lives in, with the water surface at z = 0 (paper, Sec. 4).
 
-    Attributes:
-        lower, upper: corners of the box in m; the vehicle's centre must stay inside.
-        zone: half-height mu of the transition zone in m.
-        sensor_range: an obstacle is detected once its surface has been this close to the vehicle's centre, m.
-        goal_radius: distance in m at which the goal counts as reached.
-        rough_speed: lateral speed in m/s above which a crossing is rough.
-        rough_tilt: tilt in rad above which a crossing is rough.
-        vertical_mode: inside the zone the lateral reference gives way to holding still.
-        rough_transition: "fail" ends an episode at a rough crossing; "count" only counts it.
-
-    Raises:
-        ValueError: a value out of range, named with its unit.
+    Raises ValueError for a value out of range, named with its unit.
     """
 
-    lower: tuple[float, float, float] = (-10.0, -10.0, -5.0)
-    upper: tuple[float, float, float] = (10.0, 10.0, 10.0)
-    zone: float = 0.8
-    sensor_range: float = 3.0
-    goal_radius: float = 0.5
-    rough_speed: float = 0.2
-    rough_tilt: float = math.radians(5.0)
-    vertical_mode: bool = True
-    rough_transition: str = "fail"
+    lower: tuple[float, float, float] = (-10.0, -10.0, -5.0)  #: corner of the box the vehicle's centre must stay in, m
+    upper: tuple[float, float, float] = (10.0, 10.0, 10.0)  #: the opposite corner, m
+    zone: float = 0.8  #: half-height μ of the transition zone, m
+    sensor_range: float = 3.0  #: an obstacle is detected once its surface has been this close to the centre, m
+    goal_radius: float = 0.5  #: distance at which the goal counts as reached, m
+    rough_speed: float = 0.2  #: lateral speed above which a crossing is rough, m/s
+    rough_tilt: float = math.radians(5.0)  #: tilt above which a crossing is rough, rad
+    vertical_mode: bool = True  #: inside the zone the lateral reference gives way to holding still
+    rough_transition: str = "fail"  #: "fail" ends an episode at a rough crossing; "count" only counts it
 
     def __post_init__(self) -> None:
         """Check every field."""
         for name in ("lower", "upper"):
             corner = getattr(self, name)
-            if len(corner) != 3 or not all(math.isfinite(value) for value in corner):
+            if len(corner) != 3 or not all(map(math.isfinite, corner)):
                 raise ValueError(f"World.{name} must be three finite numbers (m), got {corner!r}")
-            object.__setattr__(self, name, tuple(float(value) for value in corner))  # hashable, whatever was given
+            object.__setattr__(self, name, tuple(map(float, corner)))  # hashable, whatever was given
         for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
             if low >= high:
                 raise ValueError(f"World.upper must exceed World.lower along {axis} (m), got {low!r} to {high!r}")
-        for name, unit in (
-            ("zone", "m"),
-            ("sensor_range", "m"),
-            ("goal_radius", "m"),
-            ("rough_speed", "m/s"),
-            ("rough_tilt", "rad"),
-        ):
+        units = {"zone": "m", "sensor_range": "m", "goal_radius": "m", "rough_speed": "m/s", "rough_tilt": "rad"}
+        for name, unit in units.items():
             value = getattr(self, name)
             if not math.isfinite(value) or value <= 0:
                 raise ValueError(f"World.{name} must be positive ({unit}), got {value!r}")
@@ -84,14 +68,6 @@ class World:
 
 def world_params(world: World) -> WorldParams:
     """Flatten a world for the kernels."""
-    return WorldParams(
-        *world.lower,
-        *world.upper,
-        world.zone,
-        world.sensor_range,
-        world.goal_radius,
-        world.rough_speed,
-        math.cos(world.rough_tilt),
-        float(world.vertical_mode),
-        float(world.rough_transition == "fail"),
-    )
+    lengths = world.zone, world.sensor_range, world.goal_radius
+    flags = float(world.vertical_mode), float(world.rough_transition == "fail")
+    return WorldParams(*world.lower, *world.upper, *lengths, world.rough_speed, math.cos(world.rough_tilt), *flags)

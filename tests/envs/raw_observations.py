@@ -3,10 +3,7 @@
 import numpy as np
 
 from hydrone_gym import HYDRONE, World
-from hydrone_gym.perception.egocentric import (
-    NAMES,
-    Egocentric,
-)
+from hydrone_gym.perception.egocentric import NAMES, Egocentric
 from hydrone_gym.simulation.simulation import Simulation
 from tests.simulation.batches import random_references, random_rows
 

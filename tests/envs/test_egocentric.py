@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, World
 from hydrone_gym.envs.spaces import egocentric_space, relative_action_space
-from hydrone_gym.perception.egocentric import (
-    NAMES,
-    OBSERVATION_SIZE,
-    Egocentric,
-    Memory,
-)
+from hydrone_gym.perception.egocentric import NAMES, OBSERVATION_SIZE, Egocentric, Memory, pack_egocentric
 from hydrone_gym.perception.rays import REACH
-from hydrone_gym.perception.relative import pack_egocentric
 from hydrone_gym.simulation.simulation import Simulation
 from tests.envs.raw_observations import EGO, INDEX, VAST_EGO, WORLD, entry, extreme, random_raw, raw
 

@@ -8,9 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hydrone_gym.perception.egocentric import (
-    Memory,
-)
+from hydrone_gym.perception.egocentric import Memory
 from tests.envs.missions import same
 from tests.envs.raw_observations import EGO, VAST_EGO, entry, random_raw, raw
 

@@ -11,9 +11,9 @@ from hydrone_gym.perception.egocentric import (
     Memory,
     new_memory,
     observe_rows,
+    place_references,
 )
 from hydrone_gym.perception.perceived import perceive
-from hydrone_gym.perception.relative import place_references
 from tests.envs.missions import AIR_TO_AIR, DIVE, SPHERE_BETWEEN, begin, same
 from tests.envs.raw_observations import EGO, WORLD, random_raw
 from tests.simulation.batches import random_rows

@@ -7,6 +7,7 @@ from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, World
 from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import pack_task
+from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.time_to_go import cruise_speeds
 from planners.cl_rrt.objective import objective_params
 from tests.envs.missions import AIR_TO_AIR, IDS, begin, fly_to, make, wander
@@ -60,6 +61,6 @@ def test_time_and_slow():
 
 @pytest.mark.parametrize("vehicle", [HYDRONE, HYDRONE_PHYSICAL])
 def test_reward_and_planners_share_one_time_to_go(vehicle):
-    speeds = list(pack_task(vehicle, World(), 120.0, 1, slice(0, 1))["speeds"][0])
+    speeds = list(pack_task(Simulation(vehicle, World()), 120.0, slice(0, 1))["speeds"][0])
     np.testing.assert_array_equal(speeds, cruise_speeds(envelope_of(vehicle)))
     np.testing.assert_array_equal(speeds, objective_params(envelope_of(vehicle), "time").rates)

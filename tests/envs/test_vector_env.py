@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded
 from hydrone_gym import Outcome
 from hydrone_gym.envs import batch
 from hydrone_gym.simulation.rows import advance_rows
-from hydrone_gym.world.generator import ScenarioLaw, generate
+from hydrone_gym.world.generator import ScenarioLaw, generate, place_many
 from hydrone_gym.world.world import World
 
 ID = "HydroneGym/Mission-v0"
@@ -138,6 +138,7 @@ def test_copies_go_on_alike(interface, monkeypatch):
         for part, other in zip(returned, twin.step(actions), strict=True):
             assert_same(part, other)
         observation = returned[0]
+    assert len(place_many.signatures) == 1, "a copy draws with what is compiled"
 
 
 def test_references_pass_through_a_filter():

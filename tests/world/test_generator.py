@@ -16,9 +16,10 @@ from hydrone_gym.world.generator import (
     draw,
     first_numbers,
     generate,
+    place,
+    place_many,
     prepare,
 )
-from hydrone_gym.world.placement import place, place_many
 from hydrone_gym.world.scenario import validate
 from hydrone_gym.world.solvability import has_grid_route, is_solvable
 from hydrone_gym.world.world import World

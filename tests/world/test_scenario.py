@@ -188,7 +188,7 @@ def _with(**entries):
         (_with(start=[1, 2, 3, True]), r"start must be a list of 4 finite numbers, got \[1, 2, 3, True\]"),
         (_with(start="1234"), "start must be a list of 4 finite numbers, got '1234'"),
         (_with(goal=[1, 2, 10**400]), "goal must be a list of 3 finite numbers"),
-        (_with(goal=[1, 2, math.nan]), "numbers must be finite, got NaN"),
+        (_with(goal=[1, 2, math.nan]), r"goal must be a list of 3 finite numbers, got \[1, 2, nan\]"),
         (_with(obstacles=[[0, 0, 0, 1], [0, 0, 0]]), r"obstacle 1 must be a list of 4 finite numbers, got \[0, 0, 0\]"),
         (_with(obstacles=None), "obstacles must be a list, got None"),
         (_with(name=None), "Scenario.name must be a string, got None"),
