@@ -3,8 +3,8 @@
     python -m benchmarks.versus ../older_checkout            # this checkout against that one
     python -m benchmarks.versus ../older_checkout --rounds 9
 
-A process a checkout does the same work in turns, so that what else the machine does hits both alike. Figures are units of
-work a CPU-second, medians over rounds; the ratio, this checkout over the other, is the median of the rounds' ratios.
+A process a checkout does the same work in turns, so that what else the machine does hits both alike. Figures are
+units of work a CPU-second, medians over rounds; the ratio is the median of the rounds' ratios, this over the other.
 """
 
 import json
