@@ -134,6 +134,12 @@ class HydroneEnv(gym.Env[Any, Any]):
         return self._core.simulations[0]
 
     @property
+    def truth(self) -> dict[str, NDArray[np.float64]]:
+        """The true `state` (12,) and the `reference` (4,) in force, whatever an observation tells; for records."""
+        row = self._core.episodes.rows[0]
+        return {"state": row["state"].copy(), "reference": row["reference"].copy()}
+
+    @property
     def vehicle(self) -> Vehicle:
         """The vehicle."""
         return self.simulation.vehicle

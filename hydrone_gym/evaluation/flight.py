@@ -22,7 +22,7 @@ class Trace(NamedTuple):
     """A flight sampled every tick (0.05 s), the start included."""
 
     times: NDArray[np.float64]  # (N,) s
-    states: NDArray[np.float64]  # (N, 12) as in the observation
+    states: NDArray[np.float64]  # (N, 12) the truth, laid out as in the observation
     references: NDArray[np.float64]  # (N, 4) the moving reference: m, m, m, rad
 
 
@@ -50,7 +50,7 @@ class Flight(Ending):
     length: float
     scenario: Scenario  #: what was flown
     references: NDArray[np.float64]  #: (K, 4) in force at the end of each period, actions clipped: m, m, m, rad
-    states: NDArray[np.float64]  #: (K + 1, 12) at the start and after each period, as in the observation
+    states: NDArray[np.float64]  #: (K + 1, 12) at the start and after each period: the truth
     detected: NDArray[np.float64]  #: (k, 4) spheres x, y, z, r in m, in order of detection
     trace: Trace  #: the same flight every tick
 
@@ -75,15 +75,16 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
     if world.options.interface != "world":
         raise ValueError(f'fly needs an environment with interface="world", got {world.options.interface!r}')
     observation, info = env.reset(seed=seed, options=None if scenario is None else {"scenario": scenario})
-    states, references, decisions, rewards = [observation["state"]], [], [], []
+    states, references, decisions, rewards = [world.truth["state"]], [], [], []
     memory, start, done = None, np.array([True]), False
     while not done:
         began = time.perf_counter()
         action, memory = policy.predict(observation, state=memory, episode_start=start, deterministic=True)
         decisions.append(1e3 * (time.perf_counter() - began))
         observation, reward, terminated, truncated, info = env.step(action)
-        states.append(observation["state"])
-        references.append(observation["reference"])
+        truth = world.truth
+        states.append(truth["state"])
+        references.append(truth["reference"])
         rewards.append(float(reward))
         start, done = np.array([False]), terminated or truncated
     trace = trace_of(world.simulation, world.scenario, states[0], np.array(references))

@@ -146,3 +146,25 @@ def test_other_environments_are_refused():
     cart_pole = gym.make("CartPole-v1")
     with pytest.raises(TypeError, match="fly needs a HyDrone environment, got CartPoleEnv"):
         fly(cart_pole, StraightLine.for_env(gym.make(EXPERIMENTS[0])))
+
+
+class Blurred(gym.ObservationWrapper):
+    """Tells a position that is half a metre off."""
+
+    def observation(self, seen):
+        return {**seen, "state": seen["state"] + np.append([0.5, 0.0, 0.0], np.zeros(9))}
+
+
+def test_a_record_is_of_what_was_flown_not_of_what_was_told():
+    env = gym.make("HydroneGym/AirToWater-v0", num_obstacles=0)
+    told = []
+
+    class Listener:
+        def predict(self, observation, state=None, episode_start=None, deterministic=False):
+            told.append(observation["state"][0])
+            return (observation["reference"] + [1.0, 1.0, 0.0, 0.0]).astype(np.float32), None
+
+    blurred = fly(Blurred(env), Listener(), seed=0)
+    np.testing.assert_allclose(blurred.states[:-1, 0], np.array(told) - 0.5)
+    np.testing.assert_array_equal(blurred.trace.states[-1], blurred.states[-1])
+    assert blurred.states[0, :3].tolist() == list(env.unwrapped.scenario.start[:3])
