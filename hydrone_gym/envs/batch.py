@@ -31,6 +31,8 @@ _ROWS_A_THREAD = 256  # fewer are not worth waking a thread for
 
 ReferenceFilter = Callable[[Perceived, NDArray[np.float64], NDArray[np.bool_]], NDArray[np.float64]]
 
+_NOTHING = np.empty((2, 0), dtype=object)
+
 
 class Flown(NamedTuple):
     """What a step leaves behind of all rows, in new arrays."""
@@ -106,6 +108,12 @@ class EpisodeBatch:
         views = {key: array[row] for key, array in self._raw.items()} if row else self._first
         return {key: array.copy() for key, array in views.items()}
 
+    def observation(self) -> Any:
+        """Return a new observation of all rows."""
+        if self.egocentric is not None:
+            return self.seen.copy()
+        return {key: array.copy() for key, array in self._raw.items()}
+
     def new_observation(self) -> Any:
         """Return room for an observation of all rows."""
         if self.egocentric is not None:
@@ -157,9 +165,13 @@ class EpisodeBatch:
         With `same_step`, rows that end now begin anew at once.
         """
         self.starting[:] = False
+        if self._pool is None and not same_step:  # nothing to share out: copies in one go
+            self._fly_part(0, references, None)
+            now = self.episodes.report.T.copy()
+            return Flown(now, now, self.observation(), *_NOTHING)
         report, now = (np.empty((len(REPORT), self.count)) for _ in range(2))
-        last_observations, last_transitions = np.full((2, self.count if same_step else 0), None, dtype=object)
-        flown = Flown(report if same_step else now, now, self.new_observation(), last_observations, last_transitions)
+        lasts = np.full((2, self.count), None, dtype=object) if same_step else _NOTHING
+        flown = Flown(report if same_step else now, now, self.new_observation(), *lasts)
         rest = range(1, len(self._parts))
         jobs = [self._pool.submit(self._fly_part, k, references, flown) for k in rest] if self._pool else []
         try:
@@ -169,7 +181,7 @@ class EpisodeBatch:
                 job.result()
         return flown
 
-    def _fly_part(self, k: int, references: NDArray[np.float64], flown: Flown) -> None:
+    def _fly_part(self, k: int, references: NDArray[np.float64], flown: Flown | None) -> None:
         part, report, ended = self._parts[k], self.episodes.report, self.ended[self._parts[k]]
         again = part.start + ended.nonzero()[0]
         # before they fly: while one thread draws, the others advance
@@ -178,8 +190,11 @@ class EpisodeBatch:
         self.note_crossings(part)
         if missions is not None:
             self.begin(again, missions, look=False)
-        self.look(np.arange(part.start, part.stop))
+        if self.egocentric is not None:
+            self.look(np.arange(part.start, part.stop))
         np.not_equal(report[part, OUTCOME], RUNNING, out=ended)
+        if flown is None:
+            return
         if flown.report is not flown.now:
             flown.report[:, part] = report[part].T
             again = part.start + ended.nonzero()[0]
@@ -201,13 +216,17 @@ class EpisodeBatch:
                 missions.starts[k], missions.goals[k] = scenario.start, scenario.goal
                 missions.starts[k, 3] = math.remainder(scenario.start[3], 2.0 * math.pi)
                 missions.spheres[k, :given], missions.spheres[k, given:] = scenario.obstacles, NOWHERE
-        drawn = np.array([k for k in range(count) if scenarios is None or scenarios[k] is None], np.int64)
+        drawn = np.arange(count)
+        if scenarios is not None:
+            drawn = np.array([k for k in range(count) if scenarios[k] is None], np.int64)
         if drawn.size:
             # one kernel call places all, the rare rest goes one by one
             generators = [self.generators[row] for row in rows[drawn].tolist()]
-            numbers = np.stack([generator.random(first_numbers(self.draws)) for generator in generators])
+            numbers = np.empty((drawn.size, first_numbers(self.draws)))
+            for generator, line in zip(generators, numbers, strict=True):
+                generator.random(out=line)
             solved = place_many(*self._prepared, numbers, drawn, *missions)
-            for i in np.flatnonzero(~solved).tolist():
+            for i in (~solved).nonzero()[0].tolist():
                 start, goal, spheres = (array[drawn[i]] for array in missions)
                 draw(self.draws, self._prepared, generators[i], start, goal, spheres, numbers[i])
         return missions

@@ -96,8 +96,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         self._core.begin(rows, self._core.missions_of(rows, scenarios))
         if self.render_mode is not None:
             self._core.show(rows)
-        observation = self._core.new_observation()
-        self._core.observe(slice(0, self.num_envs), observation)
+        observation = self._core.observation()
         begun = np.isin(np.arange(self.num_envs), rows)
         return observation, batch_info(self._core.episodes.report.T, self._core.transitions, begun)
 
