@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent_file import TEXT, AgentFile, read_agent
-from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, Memory, RawObservation
+from hydrone_gym.perception.egocentric import OBSERVATION_SIZE, Egocentric, EgocentricMemory, RawObservation
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.world.world import World
 
@@ -41,10 +41,10 @@ class Agent:
     def predict(
         self,
         observation: RawObservation,
-        state: Memory | None = None,
+        state: EgocentricMemory | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> tuple[NDArray[np.float32], Memory]:
+    ) -> tuple[NDArray[np.float32], EgocentricMemory]:
         """Return references for one observation or a batch, in Stable-Baselines3's form.
 
         Args:

@@ -67,7 +67,7 @@ def crossed(flight: Flight, zone: float) -> Crossed:
     return Crossed(point, (air, flight.time - air - water, water), start, goal, flight.energy, share)
 
 
-def fly_worlds(scenarios: list[Scenario], objective: str) -> list[Crossed]:
+def fly_columns(scenarios: list[Scenario], objective: str) -> list[Crossed]:
     """Fly every world with one objective; those that arrive count."""
     env = gym.make("HydroneGym/Mission-v0")
     planner: Any = CLRRT.for_env(env, objective=objective)
@@ -117,7 +117,7 @@ def main(a: Settings) -> None:
     """Fly, print the table, save the figure."""
     law = law_of(a.mission, 20)
     scenarios = [generate(law, World(), HYDRONE.radius, np.random.default_rng(k)) for k in range(a.worlds)]
-    results = {objective: fly_worlds(scenarios, objective) for objective in OBJECTIVES}
+    results = {objective: fly_columns(scenarios, objective) for objective in OBJECTIVES}
     print("| objective | worlds | air s | zone s | water s | in all s | energy J | crosses after % of the way |")
     print("|---|---|---|---|---|---|---|---|")
     for objective, flown in results.items():

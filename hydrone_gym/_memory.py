@@ -9,6 +9,7 @@ All of this is one instruction a number in the machine code and one statement fo
 of the time of a first compilation goes.
 """
 
+import functools
 import itertools
 import typing
 from typing import Any
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 _DOUBLE, _LONG, _BYTE = ir.DoubleType(), ir.IntType(64), ir.IntType(8)
 
 
+@functools.cache
 def size_of(kind: type) -> int:
     """Count the numbers of a kind."""
     return sum(size_of(part) if _is_kind(part) else 1 for part in _parts(kind))
@@ -50,6 +52,7 @@ def packed(value: Any) -> NDArray[np.float64]:
     return np.array(numbers)
 
 
+@functools.cache
 def _parts(kind: Any) -> list[Any]:
     hints = typing.get_type_hints(kind)
     return [hints.get(name, float) for name in kind._fields]
@@ -59,6 +62,7 @@ def _is_kind(part: Any) -> bool:
     return isinstance(part, type) and issubclass(part, tuple)
 
 
+@functools.cache
 def _numba_type(kind: Any) -> Any:
     return types.BaseTuple.from_types([_numba_type(p) if _is_kind(p) else types.float64 for p in _parts(kind)], kind)
 

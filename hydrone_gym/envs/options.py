@@ -21,7 +21,7 @@ from hydrone_gym.vehicle import Vehicle, named_vehicle
 from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw, prepare
 from hydrone_gym.world.world import World
 
-MISSIONS = {"air_to_water": EXPERIMENT_1, "water_to_air": EXPERIMENT_2, "random": ScenarioLaw()}
+SCENARIO_LAWS = {"air_to_water": EXPERIMENT_1, "water_to_air": EXPERIMENT_2, "random": ScenarioLaw()}
 INTERFACES = ("world", "egocentric")
 MOST_OBSTACLES = 1000
 MOST_ROWS = 1_000_000
@@ -68,7 +68,7 @@ class Options:
         """Check every option, also that scenarios can be drawn with them; pictures are checked where they are made."""
         vehicle = named_vehicle(self.vehicle)
         named_law(self.controller)
-        known = {"mission": tuple(MISSIONS), "interface": INTERFACES, "rough_transition": ("fail", "count")}
+        known = {"mission": tuple(SCENARIO_LAWS), "interface": INTERFACES, "rough_transition": ("fail", "count")}
         for name, choices in known.items():
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {getattr(self, name)!r}")
@@ -101,7 +101,7 @@ class Options:
     def draws(self) -> ScenarioLaw:
         """What scenarios are drawn by at reset."""
         spheres: dict[str, Any] = {"num_obstacles": self.num_obstacles, "obstacle_radius": self.obstacle_radius}
-        return replace(MISSIONS[self.mission], **spheres)
+        return replace(SCENARIO_LAWS[self.mission], **spheres)
 
     def differences(self, other: "Options") -> list[str]:
         """Return the names of the options, but for those of pictures, in which another environment differs."""

@@ -2,7 +2,7 @@
 
 One set of kernels reads what is `Perceived`, be it of an environment's rows or of a raw observation: a policy trained
 here flies through the raw interface with the same numbers bit for bit. Besides the raw observation it needs what a
-policy can carry itself (`Memory`): where the episode started and how progress goes.
+policy can carry itself (`EgocentricMemory`): where the episode started and how progress goes.
 
 **Mission frame.** x' points horizontally from the episode's start to its goal, y' to its left, z up; it stays as it is
 for the whole episode. If the goal lies straight above or below the start, x' is the world's x. Every horizontal vector
@@ -87,7 +87,7 @@ def _clip(value):
     return LIMIT if value > LIMIT else (value if value > -LIMIT else -LIMIT)
 
 
-class Memory(NamedTuple):
+class EgocentricMemory(NamedTuple):
     """What a policy carries from one observation to the next; a leading axis for a batch."""
 
     start: NDArray[np.float64]  # (3,) where the episode started, m
@@ -173,10 +173,7 @@ def _remember(memory, state, goal, speeds):
 
 @kernel
 def observe_rows(told, obstacles, found, memory, order, values, seen):
-    """Write observations of rows `order` (k,), int64, of a `Perceived`, and move their memory on: once a period.
-
-    `memory` (n, 5) holds a `Memory` a row, `seen` is (n, OBSERVATION_SIZE), float32.
-    """
+    """Write `seen` (n, OBSERVATION_SIZE) of rows `order` (k,), and move `memory` (n, 5) on: once a period."""
     params = values[0]
     for k in range(order.size):
         n = order[k]
@@ -213,7 +210,7 @@ def place_references(told, actions, memory, values, out):
 
 
 def new_memory(count: int) -> NDArray[np.float64]:
-    """Return (n, 5) a `Memory` a row, of episodes that begin."""
+    """Return (n, 5) a `EgocentricMemory` a row, of episodes that begin."""
     return np.tile([0.0, 0.0, 0.0, np.inf, 0.0], (count, 1))
 
 
@@ -239,8 +236,8 @@ class Egocentric:
         return out
 
     def observe(
-        self, observation: RawObservation, memory: Memory | None = None, starting: ArrayLike | None = None
-    ) -> tuple[NDArray[np.float32], Memory]:
+        self, observation: RawObservation, memory: EgocentricMemory | None = None, starting: ArrayLike | None = None
+    ) -> tuple[NDArray[np.float32], EgocentricMemory]:
         """Return the flat observation, (68,) or (n, 68), and the new memory; call it once a period.
 
         `memory` is what the last call returned, None where all episodes begin; it is dropped where `starting`, () or
@@ -251,16 +248,18 @@ class Egocentric:
         memories, out = new_memory(count), np.empty((count, OBSERVATION_SIZE), np.float32)
         if memory is not None:
             parts = (memories[:, :LEAST], memories[:, LEAST], memories[:, LEAST + 1])
-            for name, own, given in zip(Memory._fields, parts, memory):
+            for name, own, given in zip(EgocentricMemory._fields, parts, memory):
                 own[:] = _shaped(f"memory.{name}", given, own.shape, single)
         if starting is not None:
             memories[_shaped("starting", starting, (count,), single) != 0.0, LEAST] = np.inf
         self.look(perceived, memories, np.arange(count), out)
         if single:
             memories, out = memories[0], out[0]
-        return out, Memory(memories[..., :LEAST].copy(), *memories[..., LEAST:].T.copy())
+        return out, EgocentricMemory(memories[..., :LEAST].copy(), *memories[..., LEAST:].T.copy())
 
-    def reference(self, action: ArrayLike, observation: RawObservation, memory: Memory) -> NDArray[np.float32]:
+    def reference(
+        self, action: ArrayLike, observation: RawObservation, memory: EgocentricMemory
+    ) -> NDArray[np.float32]:
         """Return the raw action, (4,) or (n, 4) float32 in m, m, m, rad, that a relative action stands for.
 
         `action` is (3,) or (n, 3), clipped to [-1, 1]; `memory` is what `observe` returned for the observation. Raises

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, World
 from hydrone_gym.envs.spaces import egocentric_space, relative_action_space
-from hydrone_gym.perception.egocentric import NAMES, OBSERVATION_SIZE, Egocentric, Memory, pack_egocentric
+from hydrone_gym.perception.egocentric import NAMES, OBSERVATION_SIZE, Egocentric, EgocentricMemory, pack_egocentric
 from hydrone_gym.perception.rays import REACH
 from hydrone_gym.simulation.simulation import Simulation
 from tests.envs.raw_observations import EGO, INDEX, VAST_EGO, WORLD, entry, extreme, random_raw, raw
@@ -91,7 +91,7 @@ def obvious(raw, start, clock, world=WORLD, radius=HYDRONE.radius):
 def test_every_entry_is_what_the_table_says(seed):
     rng = np.random.default_rng(seed)
     observation, start = random_raw(rng)
-    flat, _ = EGO.observe(observation, Memory(start, -1.0, seed - 1.0))
+    flat, _ = EGO.observe(observation, EgocentricMemory(start, -1.0, seed - 1.0))
     np.testing.assert_allclose(flat, obvious(observation, start, seed), atol=2e-6)
 
 
@@ -104,7 +104,7 @@ def test_rays_among_many_spheres_agree_with_sphere_tracing():
         way = rng.normal(size=(20, 3))
         way *= rng.uniform(1.5, 6.0, (20, 1)) / np.linalg.norm(way, axis=1)[:, None]
         observation["obstacles"] = np.column_stack([observation["state"][:3] + way, rng.uniform(0.1, 0.9, 20)])
-        flat, _ = EGO.observe(observation, Memory(start, -1.0, 0.0))
+        flat, _ = EGO.observe(observation, EgocentricMemory(start, -1.0, 0.0))
         np.testing.assert_allclose(flat[rays], obvious(observation, start, 1)[rays], atol=2e-6)
         free += (flat[rays] == 1).tolist()
     assert 0.05 < np.mean(free) < 0.95
@@ -200,8 +200,8 @@ def test_turning_the_world_changes_nothing(seed, angle):
     observation, start = random_raw(rng)
     observation["obstacles"][:, :3] = observation["state"][:3] + rng.uniform(-4.0, 4.0, (20, 3))
     other, other_start = turned(observation, start, angle)
-    flat, memory = VAST_EGO.observe(observation, Memory(start, 3.0, 4.0))
-    turned_flat, turned_memory = VAST_EGO.observe(other, Memory(other_start, 3.0, 4.0))
+    flat, memory = VAST_EGO.observe(observation, EgocentricMemory(start, 3.0, 4.0))
+    turned_flat, turned_memory = VAST_EGO.observe(other, EgocentricMemory(other_start, 3.0, 4.0))
     # A ray that grazes a sphere sees the square root of the rounding.
     np.testing.assert_allclose(turned_flat, flat, atol=2e-6)
     action = rng.uniform(-1.0, 1.0, 3)
@@ -217,8 +217,8 @@ def test_quarter_turns_take_the_square_box_along(quarters):
     for _ in range(20):
         observation, start = random_raw(rng)
         other, other_start = turned(observation, start, quarters * math.pi / 2)
-        flat, _ = EGO.observe(observation, Memory(start, 3.0, 4.0))
-        turned_flat, _ = EGO.observe(other, Memory(other_start, 3.0, 4.0))
+        flat, _ = EGO.observe(observation, EgocentricMemory(start, 3.0, 4.0))
+        turned_flat, _ = EGO.observe(other, EgocentricMemory(other_start, 3.0, 4.0))
         np.testing.assert_allclose(turned_flat, flat, atol=2e-6)
 
 
@@ -227,7 +227,7 @@ def test_finite_and_bounded_whatever_the_input(seed):
     n, rng = 20_000, np.random.default_rng(seed)
     batch = {"state": extreme(rng, n, 12), "reference": extreme(rng, n, 4), "goal": extreme(rng, n, 3)}
     batch["obstacles"] = extreme(rng, n, 3, 4)
-    for memory in (None, Memory(extreme(rng, n, 3), np.full(n, 3.0), np.full(n, 1e300))):
+    for memory in (None, EgocentricMemory(extreme(rng, n, 3), np.full(n, 3.0), np.full(n, 1e300))):
         flat, after = EGO.observe(batch, memory)
         assert np.isfinite(flat).all()
         assert (abs(flat) <= 5.0).all()
@@ -255,7 +255,7 @@ def test_vehicle_and_world_come_from_the_simulation():
 
 def test_bad_input_is_named():
     observation, start = random_raw(np.random.default_rng(0))
-    memory = Memory(start, 1.0, 0.0)
+    memory = EgocentricMemory(start, 1.0, 0.0)
     with pytest.raises(ValueError, match="lacks goal"):
         EGO.observe({key: value for key, value in observation.items() if key != "goal"})
     with pytest.raises(ValueError, match=r"\['reference'\] must have shape \(4,\), got \(3,\)"):
@@ -263,7 +263,7 @@ def test_bad_input_is_named():
     with pytest.raises(ValueError, match=r"\['obstacles'\] must have shape"):
         EGO.observe({**observation, "obstacles": np.zeros(4)})
     with pytest.raises(ValueError, match=r"memory.start must have shape \(3,\)"):
-        EGO.observe(observation, Memory(np.zeros(2), 1.0, 0.0))
+        EGO.observe(observation, EgocentricMemory(np.zeros(2), 1.0, 0.0))
     with pytest.raises(ValueError, match=r"action must have shape \(3,\), got \(4,\)"):
         EGO.reference(np.zeros(4), observation, memory)
     with pytest.raises(ValueError, match="action must be finite"):

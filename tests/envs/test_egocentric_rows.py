@@ -8,7 +8,7 @@ from hydrone_gym.perception.egocentric import (
     LEAST,
     OBSERVATION_SIZE,
     Egocentric,
-    Memory,
+    EgocentricMemory,
     new_memory,
     observe_rows,
     place_references,
@@ -50,13 +50,13 @@ def test_a_batch_is_its_rows_bit_for_bit(count):
     batch, starts = random_raw(rng, count)
     batch["obstacles"][::2, 5:] = 0.0
     action = rng.uniform(-1.0, 1.0, (count, 3)).astype(np.float32)
-    memory = Memory(starts, rng.uniform(0.0, 20.0, count), np.arange(float(count)))
+    memory = EgocentricMemory(starts, rng.uniform(0.0, 20.0, count), np.arange(float(count)))
     flat, after = EGO.observe(batch, memory)
     places = EGO.reference(action, batch, after)
     assert flat.dtype == places.dtype == np.float32
     for n in range(count):
         single = {key: value[n] for key, value in batch.items()}
-        one, own = EGO.observe(single, Memory(*(part[n] for part in memory)))
+        one, own = EGO.observe(single, EgocentricMemory(*(part[n] for part in memory)))
         assert same(one, flat[n])
         assert all(a.tobytes() == b[n].tobytes() for a, b in zip(own, after, strict=True))
         assert same(EGO.reference(action[n], single, own), places[n])
@@ -80,6 +80,6 @@ def test_every_caller_shares_one_compiled_version():
     batch, _ = random_raw(np.random.default_rng(0), 3)
     _, memory = EGO.observe({key: value.astype(np.float32) for key, value in batch.items()})
     turned_storage = {key: np.asfortranarray(value) for key, value in batch.items()}
-    EGO.observe(turned_storage, Memory(*map(np.asfortranarray, memory)), [0, 1, 0])
+    EGO.observe(turned_storage, EgocentricMemory(*map(np.asfortranarray, memory)), [0, 1, 0])
     EGO.reference(np.zeros((3, 3), int), turned_storage, memory)
     assert len(observe_rows.signatures) == len(place_references.signatures) == 1
