@@ -209,6 +209,12 @@ def select(typingctx, condition, value, otherwise):
 
 
 @intrinsic
+def zero_like(typingctx, value):
+    """A tuple of the same kind, all of whose numbers are zero."""
+    return value(value), lambda context, builder, sig, args: context.get_constant_null(sig.return_type)
+
+
+@intrinsic
 def call(typingctx, address, *arguments):
     """Call a `hydrone_gym._jit.unit` by its address; arrays and records are handed over as pointers to their data."""
 

@@ -9,7 +9,7 @@ from numba.core.errors import TypingError
 
 from hydrone_gym import _memory
 from hydrone_gym._jit import kernel, unit
-from hydrone_gym._memory import call, gather, packed, pointer, scatter, select, shifted, view
+from hydrone_gym._memory import call, gather, packed, pointer, scatter, select, shifted, view, zero_like
 
 
 class Pair(NamedTuple):
@@ -74,6 +74,17 @@ def test_layout():
         ("middle",),
         ("last", (2,)),
     ]
+
+
+@kernel
+def nothing(numbers):
+    return zero_like(gather(numbers, 0, 0, 1, Nest))
+
+
+def test_zero_of_a_kind():
+    zero = nothing(np.arange(1.0, 6.0))
+    assert packed(zero).tolist() == [0.0] * 5
+    assert zero._fields == Nest._fields
 
 
 def test_select_takes_all_of_one():

@@ -11,7 +11,7 @@ from numba.extending import overload
 
 from hydrone_gym._jit import inlined
 from hydrone_gym.control.envelope import Envelope
-from hydrone_gym.control.reference import Integral, clamp
+from hydrone_gym.control.reference import clamp
 from hydrone_gym.vehicle import Vehicle
 
 
@@ -86,10 +86,4 @@ def control(now, integral, model, dt):
     low, high = now.medium.rotor_min, now.medium.rotor_max
     s1, s2, s3, s4 = clamp(w1, low, high), clamp(w2, low, high), clamp(w3, low, high), clamp(w4, low, high)
     free = s1 == w1 and s2 == w2 and s3 == w3 and s4 == w4
-    memory = Integral(
-        memory.z if free else integral.z,
-        memory.phi if free else integral.phi,
-        memory.theta if free else integral.theta,
-        memory.psi if free else integral.psi,
-    )
-    return (s1, s2, s3, s4), memory
+    return (s1, s2, s3, s4), memory if free else integral

@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 
 from hydrone_gym._jit import inlined, unit
-from hydrone_gym._memory import gather, scatter, select
+from hydrone_gym._memory import gather, scatter, select, zero_like
 from hydrone_gym.control.law import control
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.control.reference import Instant, Integral, Reference
@@ -84,18 +84,7 @@ def substep(b, i, lanes, fraction, inverse_period, model):
     new = step(state, attitude, speeds, model.vehicle, medium, air, DT)
     scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + shaft_power(medium, speeds) * DT)
     crossed = air != is_air(new.z)
-    scatter(
-        b,
-        FLOWN_AT.integral,
-        i,
-        lanes,
-        Integral(
-            0.0 if crossed else integral.z,
-            0.0 if crossed else integral.phi,
-            0.0 if crossed else integral.theta,
-            0.0 if crossed else integral.psi,
-        ),
-    )
+    scatter(b, FLOWN_AT.integral, i, lanes, select(crossed, zero_like(integral), integral))
     scatter(b, FLOWN_AT.state, i, lanes, new)
     note_crossing(b, i, lanes, crossed, new, attitude)
 
