@@ -31,7 +31,7 @@ from hydrone_gym.simulation.storage import (
     Episode,
     Point,
     Pose,
-    new_rows,
+    new_block,
 )
 
 
@@ -69,7 +69,7 @@ class Rollout:
 
     def __init__(self, simulation: Simulation, obstacles: NDArray[np.float64]) -> None:
         """Lay out the obstacles."""
-        self._engine = simulation.engine
+        self._engine = simulation.engine._replace(block=new_block(1))
         self._obstacles = np.array(obstacles, np.float64).reshape(-1)
         self._closest = np.zeros(len(obstacles))
 
@@ -157,7 +157,7 @@ class Flock:
     def __init__(self, simulation: Simulation, row: np.ndarray, count: int, obstacles: NDArray[np.float64]) -> None:
         """Lay out rows and obstacles."""
         self.rows = np.repeat(row, count)
-        self._engine, self._count = simulation.engine, len(obstacles)
+        self._engine, self._count = simulation.engine._replace(block=new_block(LANES)), len(obstacles)
         blocks = -(-count // LANES)
         self._obstacles = np.tile(np.repeat(obstacles.reshape(-1), LANES), (blocks, 1))
         self._closest = np.full((blocks, self._count * LANES), np.inf)
@@ -168,4 +168,4 @@ class Flock:
         advance_rows(self._engine, self.rows, references, self._obstacles, self._closest, self._count, 0, ticks)
 
 
-__all__ = ["Flock", "Lane", "Result", "Rollout", "lane_of", "new_rows", "propagate"]
+__all__ = ["Flock", "Lane", "Result", "Rollout", "lane_of", "propagate"]

@@ -80,3 +80,11 @@ def test_storage_is_declared_once():
     assert VESSEL == _memory.size_of(Flown) + _memory.size_of(Pose) == 21
     assert ROW.fields["reference"][1] == 8 * _memory.size_of(Flown)
     assert new_block(LANES).ctypes.data % 64 == 0
+
+
+def test_rollouts_of_one_simulation_share_no_lane():
+    """Two planners, or two threads, may hold rollouts of the same simulation."""
+    simulation = Simulation(HYDRONE, WORLD)
+    first, second = Rollout(simulation, np.zeros((0, 4))), Rollout(simulation, np.zeros((0, 4)))
+    assert not np.shares_memory(first.memory[0].block, second.memory[0].block)
+    assert not np.shares_memory(first.memory[0].block, simulation.engine.block)
