@@ -18,6 +18,7 @@ import os
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ except ImportError:  # Windows: processes that start together compile the same t
 
 _ROOT = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(r"^\s*from ((?:hydrone_gym|planners|agents)[\w.]*) import (.*)$", re.MULTILINE)
+_PATIENCE, _GLANCE = 120.0, 0.05  # s that a process waits for another one to compile, and between looks
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False}
 
 
@@ -99,25 +101,56 @@ class _SharedCache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what is stored; if nothing is, hold the lock until it is, or wait for who holds it."""
         found = super().load_overload(sig, target_context)
-        if found is None and fcntl is not None and self._lock is None:
-            with contextlib.suppress(OSError):
-                Path(self.cache_path).mkdir(parents=True, exist_ok=True)
-                self._lock = open(Path(self.cache_path, f"{self._name}.lock"), "w")  # noqa: SIM115  held while compiling
-                fcntl.flock(self._lock, fcntl.LOCK_EX)
+        if found is None and self._acquire():
             found = super().load_overload(sig, target_context)
             if found is not None:
-                self._release()
+                self.release()
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store a function and let the others have it."""
-        super().save_overload(sig, data)
-        self._release()
+        try:
+            super().save_overload(sig, data)
+        finally:
+            self.release()
 
-    def _release(self) -> None:
+    def _acquire(self) -> bool:
+        """Take the lock, or give up after a while: it saves work, and must never hold anybody up for good."""
+        if fcntl is None or self._lock is not None:
+            return False
+        with contextlib.suppress(OSError):
+            Path(self.cache_path).mkdir(parents=True, exist_ok=True)
+            lock = open(Path(self.cache_path, f"{self._impl.filename_base}.lock"), "w")  # noqa: SIM115  kept open
+            for _ in range(int(_PATIENCE / _GLANCE)):
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    time.sleep(_GLANCE)
+                else:
+                    self._lock = lock
+                    return True
+            lock.close()
+        return False
+
+    def release(self) -> None:
+        """Let others go on: what was compiled is stored, or failed."""
         if self._lock is not None:
+            fcntl.flock(self._lock, fcntl.LOCK_UN)  # closing is not enough where a forked process has it open too
             self._lock.close()
             self._lock = None
+
+
+def _releasing(compile_it: Callable, cache: _SharedCache) -> Callable:
+    """Make a compiler let go of the lock when it fails or is interrupted."""
+
+    def compile_or_release(*arguments: Any) -> Any:
+        try:
+            return compile_it(*arguments)
+        except BaseException:
+            cache.release()
+            raise
+
+    return compile_or_release
 
 
 def _cached(compiled: Any, function: Callable, *modules: str) -> Any:
@@ -130,6 +163,8 @@ def _cached(compiled: Any, function: Callable, *modules: str) -> Any:
             compiled._cache = _SharedCache(function)
         finally:
             numba.config.CACHE_DIR = before
+        compiler = getattr(compiled, "_compiler", compiled)
+        compiler.compile = _releasing(compiler.compile, compiled._cache)
     return compiled
 
 

@@ -67,6 +67,11 @@ def _numba_type(kind: Any) -> Any:
     return types.BaseTuple.from_types([_numba_type(p) if _is_kind(p) else types.float64 for p in _parts(kind)], kind)
 
 
+def _readable(kind: Any) -> bool:
+    """Whether memory holds float64 numbers one after the other; anything else would be read as garbage."""
+    return not isinstance(kind, types.Array) or (kind.layout == "C" and kind.dtype == types.float64)
+
+
 def _start(builder: Any, kind: Any, value: Any) -> Any:
     """Pointer to the first number of an array, a record, or where a pointer leads."""
     if isinstance(kind, types.Array):
@@ -120,6 +125,8 @@ def _read_field(context, builder, view, value, name):
 @intrinsic
 def view(typingctx, memory, at, kind):
     """Look at memory, from number `at` on, as a kind; see `View`."""
+    if not _readable(memory):
+        return None
 
     def code(context, builder, sig, args):
         return builder.gep(_start(builder, sig.args[0], args[0]), [args[1]], inbounds=True)
@@ -130,6 +137,8 @@ def view(typingctx, memory, at, kind):
 @intrinsic
 def pointer(typingctx, memory):
     """Pointer to the float64 numbers of an array or of a record: ``p[k]`` reads and writes, unchecked."""
+    if not _readable(memory):
+        return None
     result = types.CPointer(types.float64)
     return result(memory), lambda context, builder, sig, args: _start(builder, sig.args[0], args[0])
 
@@ -137,6 +146,8 @@ def pointer(typingctx, memory):
 @intrinsic
 def shifted(typingctx, memory, count):
     """Pointer to what lies a number of float64 further on."""
+    if not _readable(memory):
+        return None
     result = types.CPointer(types.float64)
 
     def code(context, builder, sig, args):
@@ -148,6 +159,8 @@ def shifted(typingctx, memory, count):
 @intrinsic
 def gather(typingctx, memory, at, i, stride, kind):
     """Read a kind, or a float: its number k lies at index ``(at + k) * stride + i``."""
+    if not _readable(memory):
+        return None
     result = _numba_type(kind.instance_class) if isinstance(kind, types.NamedTupleClass) else types.float64
 
     def read(context, builder, wanted, take):
@@ -174,7 +187,8 @@ def _flat(builder: Any, kind: Any, value: Any) -> list[Any]:
 @intrinsic
 def scatter(typingctx, memory, at, i, stride, value):
     """Write a named tuple, or a float: its number k goes to index ``(at + k) * stride + i``."""
-    if any(t != types.float64 for t in _leaves(value)):
+    writable = _readable(memory) and getattr(memory, "mutable", True)
+    if not writable or any(t != types.float64 for t in _leaves(value)):
         return None
 
     def code(context, builder, sig, args):
@@ -217,6 +231,8 @@ def zero_like(typingctx, value):
 @intrinsic
 def call(typingctx, address, *arguments):
     """Call a `hydrone_gym._jit.unit` by its address; arrays and records are handed over as pointers to their data."""
+    if not all(map(_readable, arguments)):
+        return None
 
     def code(context, builder, sig, args):
         given = []

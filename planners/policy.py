@@ -42,9 +42,9 @@ def known(observation: Observation, index: int | None = None) -> Known:
     missing = [key for key in KEYS if key not in observation]
     if missing:
         raise ValueError(f"observation lacks {', '.join(missing)}; planners read the interface='world' observation")
-    parts = [np.asarray(observation[key], dtype=np.float64) for key in KEYS]
+    parts = [np.asarray(observation[key], dtype=np.float64, order="C") for key in KEYS]
     if index is not None:
-        parts = [part[index] for part in parts]
+        parts = [np.ascontiguousarray(part[index]) for part in parts]
     for key, part in zip(KEYS, parts, strict=True):
         if not np.isfinite(part).all():
             raise ValueError(f"observation[{key!r}] must be finite, got {part}")

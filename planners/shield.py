@@ -163,14 +163,14 @@ class Shield:
         rows = new_rows(count)
         for key in ("state", "integral", "reference", "goal"):
             rows[key] = np.reshape(observation[key], rows[key].shape)
-        spheres = np.array(observation["obstacles"], np.float64).reshape(count, -1, 4)
+        spheres = np.array(observation["obstacles"], np.float64, order="C").reshape(count, -1, 4)
         spheres[spheres[:, :, 3] <= 0.0] = NOWHERE
         query = GuardQuery(
             rows=rows,
-            proposed=np.minimum(np.maximum(proposed, self._low), self._high),
+            proposed=np.ascontiguousarray(np.minimum(np.maximum(proposed, self._low), self._high)),
             spheres=spheres.reshape(count, -1),
             sent=np.empty((count, 4)),
-            held=np.array(held, np.float64),
+            held=np.array(held, np.float64, order="C"),
             choice=np.empty(count, np.int64),
         )
         rollout = Rollout(self.simulation, np.empty((spheres.shape[1], 4))).memory

@@ -8,10 +8,10 @@ from hydrone_gym.vehicle import Vehicle
 LAWS: dict[str, Law] = {law.name: law for law in (paper.LAW,)}
 
 
-def named_law(name: str) -> Law:
-    """Return the law of a name; raises ValueError listing the known ones."""
+def named_law(name: str, option: str = "law") -> Law:
+    """Return the law of a name; raises ValueError naming the option it came by and the known ones."""
     if name not in LAWS:
-        raise ValueError(f"law must be one of {', '.join(map(repr, LAWS))}, got {name!r}")
+        raise ValueError(f"{option} must be one of {', '.join(map(repr, LAWS))}, got {name!r}")
     return LAWS[name]
 
 

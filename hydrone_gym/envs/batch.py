@@ -137,7 +137,8 @@ class EpisodeBatch:
             offsets = checked(actions, (self.count, 3), "offsets in [-1, 1]", np.float32)
             references = self.egocentric.place(self.perceived, self.memory, offsets)
         if self.reference_filter is not None:
-            references = self.reference_filter(self.perceived, references, self.starting.copy())
+            filtered = self.reference_filter(self.perceived, references, self.starting.copy())
+            references = checked(filtered, (self.count, 4), REFERENCE, np.float64)
         return references
 
     def advance(self, references: NDArray[np.float64], k: int = 0) -> None:

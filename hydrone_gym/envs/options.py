@@ -67,7 +67,7 @@ class Options:
     def __post_init__(self) -> None:
         """Check every option, also that scenarios can be drawn with them; pictures are checked where they are made."""
         vehicle = named_vehicle(self.vehicle)
-        named_law(self.controller)
+        named_law(self.controller, "controller")
         known = {"mission": tuple(SCENARIO_LAWS), "interface": INTERFACES, "rough_transition": ("fail", "count")}
         for name, choices in known.items():
             if getattr(self, name) not in choices:

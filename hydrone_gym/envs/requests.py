@@ -77,8 +77,8 @@ def load_reference(action: ArrayLike, low: NDArray, high: NDArray, out: NDArray[
 
 
 def checked(actions: ArrayLike, shape: tuple[int, int], words: str, dtype: type) -> NDArray:
-    """Return actions of many rows, of which `words` tell, as an array; ValueError for a wrong shape or not finite."""
-    array: NDArray = np.asarray(actions, dtype)
+    """Return actions of many rows, of which `words` tell, row by row; ValueError for a wrong shape or not finite."""
+    array: NDArray = np.asarray(actions, dtype, order="C")
     if array.shape != shape:
         raise ValueError(f"actions must have shape {shape} {words}, got {array.shape}")
     finite = np.isfinite(array)

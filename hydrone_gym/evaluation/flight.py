@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from hydrone_gym.envs.hydrone_env import HydroneEnv
@@ -116,6 +117,8 @@ def fly_worlds(
 
     Returns how the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
     """
+    if env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) != AutoresetMode.NEXT_STEP:
+        raise ValueError(f"fly_worlds needs autoreset_mode NextStep, got {env.metadata['autoreset_mode']}")
     observation, _ = env.reset(seed=seed, options=None if scenarios is None else {"scenario": list(scenarios)})
     running, memory, starts = np.arange(env.num_envs), None, np.ones(env.num_envs, bool)
     returns, shares, endings = np.zeros(env.num_envs), [], {}

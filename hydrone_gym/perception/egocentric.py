@@ -219,7 +219,8 @@ class Egocentric:
 
     def __init__(self, model: Any) -> None:
         """Pack what is believed: a model's vehicle, world and, if it has one, law."""
-        self.values = pack_egocentric(model.vehicle, model.world, getattr(model, "law", "paper"))
+        law = getattr(model, "controller", None) or getattr(model, "law", "paper")
+        self.values = pack_egocentric(model.vehicle, model.world, law)
 
     def look(
         self, perceived: Perceived, memory: NDArray[np.float64], rows: NDArray[np.int64], seen: NDArray[np.float32]

@@ -59,6 +59,11 @@ class Lane(NamedTuple):
     number: int  # of obstacles
 
 
+def _check_lanes(simulation: Simulation, lanes: int) -> None:
+    if simulation.lanes != lanes:
+        raise ValueError(f"the simulation must have {lanes} lanes, got {simulation.lanes}")
+
+
 class Rollout:
     """One vehicle, flown a period at a time.
 
@@ -68,10 +73,15 @@ class Rollout:
     """
 
     def __init__(self, simulation: Simulation, obstacles: NDArray[np.float64]) -> None:
-        """Lay out the obstacles."""
+        """Lay out the obstacles; ValueError for a simulation of many lanes."""
+        _check_lanes(simulation, 1)
         self._engine = simulation.engine._replace(block=new_block(1))
         self._obstacles = np.array(obstacles, np.float64).reshape(-1)
         self._closest = np.zeros(len(obstacles))
+
+    def __reduce__(self) -> Any:
+        """Refuse to be sent elsewhere: what it holds, the address of a kernel, is of this process."""
+        raise TypeError("a Rollout cannot be pickled: send the simulation and make it anew")
 
     @property
     def memory(self) -> tuple[Engine, NDArray[np.float64], NDArray[np.float64]]:
@@ -81,7 +91,7 @@ class Rollout:
     def fly(self, row: np.ndarray, reference: NDArray[np.float64]) -> Result:
         """Fly a row (1,) of dtype `ROW` for one period toward a reference (4,), in place; m, m, m, rad.
 
-        State, memory and reference move on; what its episode collects stays as it is.
+        State, memory, reference and energy move on; what else its episode collects stays as it is.
         """
         return Result(*_fly(self.memory, row, np.asarray(reference, np.float64)))
 
@@ -139,9 +149,11 @@ def propagate(lane, start, end, goal, reference):
 
 @kernel
 def _fly(memory, row, reference):
-    vessel = pointer(row[0])
-    goal = pointer(row[0].goal)
-    return propagate(lane_of(memory), vessel, vessel, goal, (reference[0], reference[1], reference[2], reference[3]))
+    vessel, spent = pointer(row[0]), row[0].energy
+    wanted = (reference[0], reference[1], reference[2], reference[3])
+    flown = propagate(lane_of(memory), vessel, vessel, pointer(row[0].goal), wanted)
+    row[0].energy = spent + flown.energy
+    return flown
 
 
 class Flock:
@@ -155,7 +167,9 @@ class Flock:
     """
 
     def __init__(self, simulation: Simulation, row: np.ndarray, count: int, obstacles: NDArray[np.float64]) -> None:
-        """Lay out rows and obstacles."""
+        """Lay out rows and obstacles; ValueError for a simulation of another number of lanes."""
+        _check_lanes(simulation, LANES)
+        obstacles = np.array(obstacles, np.float64)
         self.rows = np.repeat(row, count)
         self._engine, self._count = simulation.engine._replace(block=new_block(LANES)), len(obstacles)
         blocks = -(-count // LANES)
@@ -164,6 +178,7 @@ class Flock:
 
     def fly(self, references: NDArray[np.float64]) -> None:
         """Fly all of them for one period, each toward its reference of (count, 4); m and rad."""
+        references = np.ascontiguousarray(references, np.float64)
         ticks = self._engine.ticks
         advance_rows(self._engine, self.rows, references, self._obstacles, self._closest, self._count, 0, ticks)
 

@@ -73,6 +73,8 @@ class Simulation:
         last: int | None = None,
     ) -> None:
         """Advance rows in place through ticks [first, last) of a period; see `advance_rows` for the layout."""
+        if references.dtype != np.float64 or not references.flags.c_contiguous:
+            references = np.ascontiguousarray(references, np.float64)
         end = self.ticks if last is None else last
         advance_rows(self._engine or self.engine, rows, references, obstacles, closest, count, first, end)
 
@@ -101,7 +103,7 @@ def trajectory(
     row = row.copy()
     start = row["ticks"][0]
     times, states, moving = [0.0], [row["state"][0].copy()], [row["reference"][0].copy()]
-    for reference in np.asarray(references, dtype=np.float64):
+    for reference in np.asarray(references, dtype=np.float64, order="C"):
         old = row["reference"][0].copy()
         turn = (reference[3] - old[3] + np.pi) % (2.0 * np.pi) - np.pi
         move = np.append(reference[:3] - old[:3], turn)

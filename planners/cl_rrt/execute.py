@@ -180,6 +180,8 @@ def verify_stop(p, first):
     node, count = first, 0
     while p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
+        if node < 0:  # what comes after it was pruned
+            return 0
         reference = reference_of(pointer(p.nodes[node]))
         safe, _, _ = follow(p.check, end, end, reference)
         if not safe or count >= BACKUP - 1:
