@@ -219,7 +219,7 @@ class Egocentric:
 
     def __init__(self, model: Any) -> None:
         """Pack what is believed: a model's vehicle, world and, if it has one, law."""
-        law: str = getattr(model, "controller", None) or getattr(model, "law", "paper")
+        law: Any = getattr(model, "controller", None) or getattr(model, "law", "paper")
         self.values = pack_egocentric(model.vehicle, model.world, law)
 
     def look(
