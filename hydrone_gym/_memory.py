@@ -86,6 +86,11 @@ def _place(builder: Any, base: Any, place: Any, k: int) -> Any:
     return builder.gep(builder.gep(base, [field], inbounds=True), [i], inbounds=True)
 
 
+def _further(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Code of an intrinsic (memory, count, ...): pointer to what lies a number of float64 further on."""
+    return builder.gep(_start(builder, sig.args[0], args[0]), [args[1]], inbounds=True)
+
+
 class View(types.Type):
     """Where a kind lies one number after the other: ``view.name`` reads a field when it is asked for, and no other."""
 
@@ -128,10 +133,7 @@ def view(typingctx, memory, at, kind):
     if not _readable(memory):
         return None
 
-    def code(context, builder, sig, args):
-        return builder.gep(_start(builder, sig.args[0], args[0]), [args[1]], inbounds=True)
-
-    return View(kind.instance_class)(memory, types.intp, kind), code
+    return View(kind.instance_class)(memory, types.intp, kind), _further
 
 
 @intrinsic
@@ -150,10 +152,7 @@ def shifted(typingctx, memory, count):
         return None
     result = types.CPointer(types.float64)
 
-    def code(context, builder, sig, args):
-        return builder.gep(_start(builder, sig.args[0], args[0]), [args[1]], inbounds=True)
-
-    return result(memory, types.intp), code
+    return result(memory, types.intp), _further
 
 
 @intrinsic

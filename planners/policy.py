@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from planners.belief import Belief, belief_of
 
 Observation = Mapping[str, NDArray]
-KEYS = ("state", "integral", "reference", "goal", "obstacles")
 
 
 class Known(NamedTuple):
@@ -25,6 +24,9 @@ class Known(NamedTuple):
     def vessel(self) -> NDArray[np.float64]:
         """State, controller memory and reference in force as one vessel, with no energy spent."""
         return np.concatenate([self.state, self.integral, [0.0], self.reference])
+
+
+KEYS = Known._fields
 
 
 def whole_number(name: str, value: Any, least: int) -> int:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym._memory import packed
+from hydrone_gym.perception.perceived import TOLD
 from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.storage import VESSEL, new_rows
 from hydrone_gym.surface import in_air
@@ -161,7 +162,7 @@ class Shield:
         if not np.isfinite(proposed).all():
             raise ValueError(f"proposed references must be finite, got {proposed}")
         rows = new_rows(count)
-        for key in ("state", "integral", "reference", "goal"):
+        for key in TOLD:
             rows[key] = np.reshape(observation[key], rows[key].shape)
         spheres = np.array(observation["obstacles"], np.float64, order="C").reshape(count, -1, 4)
         spheres[spheres[:, :, 3] <= 0.0] = NOWHERE
