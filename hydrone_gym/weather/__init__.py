@@ -1,0 +1,7 @@
+"""Weather: wind with gusts, current and waves, each drawn from an episode's key alone.
+
+noise       random numbers that are a function of a key and a count
+wind        a mean and Dryden gusts
+current     a mean and a Gauss-Markov variation
+waves       regular, or a few components of a JONSWAP spectrum
+"""

@@ -1,0 +1,79 @@
+"""Random numbers that are a function of a key and a count, so that no order of flying can change them.
+
+The weather of an episode is drawn with the key of that episode: number n is the same whoever asks, for one row or many
+side by side, and however a period is cut up. The hash is Chris Wellons' ``lowbias32``, twice for 64 bits of key; normal
+numbers follow by Box and Muller.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hydrone_gym._jit import inlined
+from hydrone_gym.physics.exponentials import log
+from hydrone_gym.physics.trigonometry import sincos
+
+_LOW = 0xFFFFFFFF
+_GOLDEN = 0x9E3779B9
+_WHOLE = 4503599627370496.0  # 2**52, see `hydrone_gym.physics.exponentials`
+_WHOLE_BITS = 0x4330000000000000
+
+
+class Key(NamedTuple):
+    """The key of a stream: two whole numbers below 2**32, kept as floats."""
+
+    low: float
+    high: float
+
+
+@inlined
+def _whole(x):
+    """Bits of a whole number of at least 0 and below 2**32 that is kept as a float."""
+    return np.float64(x + _WHOLE).view(np.int64) & _LOW
+
+
+@inlined
+def _float(n):
+    """The float of a whole number below 2**32."""
+    return (n | _WHOLE_BITS).view(np.float64) - _WHOLE
+
+
+@inlined
+def _hashed(x):
+    """Mix the bits of a whole number below 2**32."""
+    x = x ^ (x >> 16)
+    x = (x * 0x7FEB352D) & _LOW
+    x = x ^ (x >> 15)
+    x = (x * 0x846CA68B) & _LOW
+    return x ^ (x >> 16)
+
+
+@inlined
+def _pair(key, n):
+    """Two hashes of number n, below 2**32."""
+    first = _hashed(_whole(key.low) ^ ((_whole(n) * _GOLDEN) & _LOW))
+    second = _hashed((first + _whole(key.high)) & _LOW)
+    return second, _hashed(second ^ _GOLDEN)
+
+
+@inlined
+def uniforms(key, n):
+    """Return pair n of independent numbers uniform between 0 and 1, neither included."""
+    first, second = _pair(key, n)
+    return (_float(first) + 0.5) * 2.0**-32, (_float(second) + 0.5) * 2.0**-32
+
+
+@inlined
+def normals(key, n):
+    """Return pair n of independent standard normal numbers; it is made of the same bits as `uniforms` of n."""
+    first, second = uniforms(key, n)
+    length = np.sqrt(-2.0 * log(first))
+    sine, cosine = sincos(6.283185307179586 * second)
+    return length * cosine, length * sine
+
+
+@inlined
+def derived(key, n):
+    """Return the key of stream n of a key: of an episode, from that of all episodes of a row."""
+    first, second = _pair(key, n)
+    return Key(_float(first), _float(second ^ _whole(key.high)))
