@@ -37,7 +37,7 @@ def exp(x):
             + t * (6.61375632143793436117e-05 + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08))
         )
     )
-    power = (np.float64(k + _BIAS + _WHOLE).view(np.int64) << 52).view(np.float64)
+    power = np.int64(np.float64(k + _BIAS + _WHOLE).view(np.int64) << 52).view(np.float64)
     return (1.0 - ((low - (r * c) / (2.0 - c)) - high)) * power
 
 
@@ -45,8 +45,8 @@ def exp(x):
 def log(x):
     """Return the natural logarithm of a positive, normal number."""
     bits = np.float64(x).view(np.int64)
-    exponent = ((bits >> 52) | _WHOLE_BITS).view(np.float64) - (_WHOLE + _BIAS)
-    mantissa = ((bits & _MANTISSA) | _ONE_BITS).view(np.float64)
+    exponent = np.int64((bits >> 52) | _WHOLE_BITS).view(np.float64) - (_WHOLE + _BIAS)
+    mantissa = np.int64((bits & _MANTISSA) | _ONE_BITS).view(np.float64)
     big = mantissa > 1.4142135623730951
     f = (0.5 * mantissa if big else mantissa) - 1.0
     k = exponent + 1.0 if big else exponent

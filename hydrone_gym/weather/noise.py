@@ -35,7 +35,7 @@ def _whole(x):
 @inlined
 def _float(n):
     """The float of a whole number below 2**32."""
-    return (n | _WHOLE_BITS).view(np.float64) - _WHOLE
+    return np.int64(n | _WHOLE_BITS).view(np.float64) - _WHOLE
 
 
 @inlined
