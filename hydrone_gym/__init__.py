@@ -8,7 +8,8 @@ from gymnasium.envs.registration import register
 
 from hydrone_gym.physics.dynamics import state_derivative
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.vehicle import HYDRONE, HYDRONE_PHYSICAL, AirGains, Vehicle, WaterGains
+from hydrone_gym.vehicle import HYDRONE, HYDRONE_2021, HYDRONE_PHYSICAL, AirGains, Vehicle, WaterGains
+from hydrone_gym.weather import Spread, Weather
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario
 from hydrone_gym.world.world import World
 
@@ -16,12 +17,15 @@ __version__ = "0.1.0"
 
 __all__ = [
     "HYDRONE",
+    "HYDRONE_2021",
     "HYDRONE_PHYSICAL",
     "AirGains",
     "Outcome",
     "Scenario",
+    "Spread",
     "Vehicle",
     "WaterGains",
+    "Weather",
     "World",
     "__version__",
     "load_scenario",

@@ -28,6 +28,7 @@ import numpy as np
 from numba.core import sigutils
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
+from numba.extending import register_jitable
 
 try:
     import fcntl
@@ -199,3 +200,8 @@ def inlined(function: Callable) -> Any:
 def routine(function: Callable) -> Any:
     """Compile a large function that other kernels call: one copy of its code, not inlined, not cached by itself."""
     return numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+
+
+def shared(function: Callable) -> Any:
+    """Let kernels call a function that stays what it is for Python: plain arithmetic, for what Python works out too."""
+    return register_jitable(error_model="numpy")(function)

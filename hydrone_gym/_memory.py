@@ -52,6 +52,16 @@ def packed(value: Any) -> NDArray[np.float64]:
     return np.array(numbers)
 
 
+def unpacked(kind: Any, numbers: NDArray[np.float64]) -> Any:
+    """Return the kind whose numbers these are, the inverse of `packed`."""
+    left = iter(numbers.tolist())
+
+    def build(part: Any) -> Any:
+        return part(*(build(inner) if _is_kind(inner) else next(left) for inner in _parts(part)))
+
+    return build(kind)
+
+
 @functools.cache
 def _parts(kind: Any) -> list[Any]:
     hints = typing.get_type_hints(kind)

@@ -1,7 +1,8 @@
-"""Parameters of the vehicle: physical constants and controller gains, in two named sets.
+"""Parameters of the vehicle: physical constants and controller gains, in three named sets.
 
 `HYDRONE` is Table 1 of the paper as tabled; `HYDRONE_PHYSICAL` replaces the five entries that contradict physics
-(docs/deviations.md, E4, E6, E8, E14, E15). Both are one model: the equations never ask which set they were given.
+(docs/deviations.md, E4, E6, E8, E14, E15); `HYDRONE_2021` adds what the authors' own simulator of 2021 has
+beyond it. They are one model: the equations never ask which set they were given.
 """
 
 import dataclasses
@@ -106,7 +107,12 @@ class Vehicle:
     """One vehicle: Table 1 of the paper, rotor limits, collision radius and the gains that fly it.
 
     Diagonal entries stand for the diagonal matrices of the paper. Drag is per unit density (deviation E5): the force
-    along body axis i is ``density * drag[i] * abs(v_i) * v_i``. Raises ValueError naming the field, the rule and the
+    along body axis i is ``density * drag[i] * abs(v_i) * v_i``. From `height` to `medium_delay` the defaults are the
+    paper's ideal, and planners believe in it whatever is given: a hull of some height is partly submerged over it,
+    rotors follow their speed with a first-order lag, drag against the air in their plane by ``rotor_drag`` times their
+    speed, and in water thrust by ``curve[0] + curve[1] * abs(n) + curve[2] * n**2`` instead of `thrust_water` (a curve
+    that begins with 0 is none); the water below carries rotors of `near_water_radius`; and the controller notices
+    another medium after `medium_delay`. Raises ValueError naming the field, the rule and the
     unit for a value that is not finite or has the wrong sign.
     """
 
@@ -131,6 +137,13 @@ class Vehicle:
     rotor_limit_air: float = _number(5500.0, "rpm")
     rotor_limit_water: float = _number(2500.0, "rpm")
     radius: float = _number(0.45, "m")
+    height: float = _number(0.0, "m", "not negative")
+    rotor_lag_air: float = _number(0.0, "s", "not negative")
+    rotor_lag_water: float = _number(0.0, "s", "not negative")
+    rotor_drag: float = _number(0.0, "N s/(m rad/s)", "not negative")
+    thrust_water_curve: tuple[float, float, float] = _triple((0.0, 0.0, 0.0), "m^4/rpm^2, m^4/rpm^3, m^4/rpm^4", "any")
+    near_water_radius: float = _number(0.0, "m", "not negative")
+    medium_delay: float = _number(0.0, "s", "not negative")
     air_gains: AirGains = field(default_factory=AirGains)
     water_gains: WaterGains = field(default_factory=WaterGains)
 
@@ -152,6 +165,13 @@ class Vehicle:
                 f"Vehicle.rotor_limit_water must exceed the neutral speed {-self.neutral_speed:.1f} rpm, "
                 f"got {self.rotor_limit_water!r} rpm"
             )
+
+    @property
+    def ideal(self) -> bool:
+        """Whether it is all in the nominal equations: no lag, no rotor drag, no height and so on."""
+        lags = self.rotor_lag_air, self.rotor_lag_water, self.medium_delay
+        rest = self.height, self.rotor_drag, self.thrust_water_curve[0], self.near_water_radius
+        return not any(lags + rest)
 
     @property
     def hover_speed(self) -> float:
@@ -178,11 +198,22 @@ HYDRONE_PHYSICAL = Vehicle(
     air_gains=AirGains(pitch_p=1400.0, pitch_d=225.0, yaw_p=600.0, yaw_d=500.0),
 )
 
-_NAMED = {vehicle.name: vehicle for vehicle in (HYDRONE, HYDRONE_PHYSICAL)}
+_PROPELLER = math.pi * 0.0275**4  # m^4: ζ(n) = π r⁴ c_T(n) of the aquatic propeller
+
+HYDRONE_2021 = Vehicle(
+    name="hydrone-2021",  # what the authors' public simulator of that year flies
+    rotational_drag=(0.625e-2, 0.625e-2, 1.25e-2),  # E6: half of its C_r, as the tabled C is half of its C_p
+    height=0.135,  # density changes over 6.75 cm either way
+    rotor_lag_air=1.0 / 30.0,
+    rotor_lag_water=1.0 / 30.0,
+    thrust_water_curve=(1.0654e-3 * _PROPELLER, -1.4307e-7 * _PROPELLER, 2.3281e-11 * _PROPELLER),
+)
+
+_NAMED = {vehicle.name: vehicle for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRONE_2021)}
 
 
 def named_vehicle(vehicle: str | Vehicle) -> Vehicle:
-    """Return the vehicle that a name stands for ("paper", "physical"), or the vehicle itself.
+    """Return the vehicle that a name stands for ("paper", "physical", "hydrone-2021"), or the vehicle itself.
 
     Raises ValueError for an unknown name and TypeError for anything else.
     """

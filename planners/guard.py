@@ -9,7 +9,7 @@ from hydrone_gym._jit import inlined, kernel, routine
 from hydrone_gym._memory import gather, pointer, scatter, view
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.physics.trigonometry import sincos
-from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of, with_first
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.world.bodies import BODY, segment_distance

@@ -21,7 +21,7 @@ from benchmarks import tables
 from benchmarks.c_reference.build import FAST, FLAGS, CReference, compiler
 from benchmarks.flying import OBSTACLES, flying_rows, lane_major, near_references, simulation, spheres_out_of_the_way
 from benchmarks.timing import Contestant, in_turns, save
-from hydrone_gym.simulation.advance import SUBSTEPS
+from hydrone_gym.simulation.clock import SUBSTEPS
 
 ROWS = 256
 

@@ -12,7 +12,7 @@ answers = begin()
 
 from benchmarks.environments import has_vector_env, single, vector  # noqa: E402
 from hydrone_gym import __version__  # noqa: E402
-from hydrone_gym.simulation.advance import SUBSTEPS, TICK  # noqa: E402
+from hydrone_gym.simulation.clock import SUBSTEPS, TICK  # noqa: E402
 
 PERIOD = round(0.5 / TICK) * SUBSTEPS
 runs = {f"single, {PERIOD} substeps": single("near", "single")[0]}

@@ -16,6 +16,7 @@ from hydrone_gym.envs.requests import load_reference, requested_scenario, reset_
 from hydrone_gym.envs.reward import TERMS
 from hydrone_gym.envs.task import OUTCOME, Episodes
 from hydrone_gym.rendering.track import Track
+from hydrone_gym.simulation.conditions import conditions_of
 from hydrone_gym.simulation.outcome import GOAL, RUNNING, TIMEOUT, Outcome
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import Vehicle
@@ -40,6 +41,7 @@ class Snapshot:
     random_state: dict[str, Any]  # of the bit generator that draws scenarios
     seed: int | None  # that it was made from
     egocentric: tuple[NDArray[np.float64], NDArray[np.float32]]  # memory and last observation, if that is the interface
+    conditions: NDArray[np.float64]  # weather, its stream, and the vehicle as it is; empty where they are not simulated
     track: Track | None  # flown so far, for pictures; None without `render_mode`
 
 
@@ -103,7 +105,9 @@ class HydroneEnv(gym.Env[Any, Any]):
 
     `info` holds `outcome`, `time` (s), `energy` (J, rotor shafts), `clearance` (least so far, m; infinite without
     obstacles), `transitions` (a dict a crossing: `time` (s), `direction` "entry" or "exit", `lateral_speed` (m/s),
-    `tilt` (rad), `vertical_speed` (m/s); at most 8 a period), `reward_terms` and, at the end, `is_success`.
+    `tilt` (rad), `vertical_speed` (m/s); at most 8 a period; speeds relative to the water), `reward_terms` and, at the
+    end, `is_success`. In weather also `weather`, the truth that no observation tells: `wind` and `water`, the
+    velocities of both around the vehicle (3,) in m/s, and `elevation`, of the surface above its mean, m.
 
     ## Arguments
     All by keyword, also through `gymnasium.make`:
@@ -134,10 +138,15 @@ class HydroneEnv(gym.Env[Any, Any]):
         return self._core.simulations[0]
 
     @property
-    def truth(self) -> dict[str, NDArray[np.float64]]:
-        """The true `state` (12,) and the `reference` (4,) in force, whatever an observation tells; for records."""
-        row = self._core.episodes.rows[0]
-        return {"state": row["state"].copy(), "reference": row["reference"].copy()}
+    def truth(self) -> dict[str, Any]:
+        """The true `state` (12,) and the `reference` (4,) in force, whatever an observation tells; for records.
+
+        Where there is weather, also `conditions`: the weather and the vehicle as they are, a
+        `hydrone_gym.simulation.conditions.Conditions`.
+        """
+        row, core = self._core.episodes.rows[0], self._core
+        told = {"state": row["state"].copy(), "reference": row["reference"].copy()}
+        return told | ({"conditions": conditions_of(core.conditions, 1, 0)} if core.weathered else {})
 
     @property
     def vehicle(self) -> Vehicle:
@@ -167,10 +176,12 @@ class HydroneEnv(gym.Env[Any, Any]):
         scenario = requested_scenario(chosen, self.simulation, core.sphere_space)
         if scenario is None:
             scenario = generate(core.draws, self.world, self.vehicle.radius, self.np_random)
-        core.begin(_ONLY, core.missions_of(_ONLY, [scenario]))
+        core.generators = [self.np_random]
+        core.reseeded |= seed is not None
+        core.begin(_ONLY, core.missions_of(_ONLY, [scenario]), [scenario])
         self._scenario, self._outcome = scenario, RUNNING
         core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
-        return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0])
+        return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0], core.weather())
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period, the reference moving to the action (4,), m and rad; returns are as the class describes them.
@@ -196,7 +207,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         if report[-1] > 0.0:
             core.note_crossings(slice(0, 1))
         self._outcome = outcome = report[OUTCOME]
-        info, truncated = info_of(report, core.transitions[0]), outcome == TIMEOUT
+        info, truncated = info_of(report, core.transitions[0], core.weather()), outcome == TIMEOUT
         if outcome != RUNNING:
             info["is_success"] = outcome == GOAL
         return core.observation_of(0), report[len(TERMS)], outcome != RUNNING and not truncated, truncated, info
@@ -220,6 +231,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
             seed=self._np_random_seed,
             egocentric=(core.memory.copy(), core.seen.copy()),
+            conditions=core.conditions.copy(),
             track=core.screen.track(0),
         )
 
@@ -235,6 +247,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             listed = ", ".join(f"{name} (snapshot {theirs!r}, here {own!r})" for name, theirs, own in pairs)
             raise ValueError(f"snapshot is of an environment with other options: {listed}")
         core, self._scenario = self._core, snapshot.scenario
+        core.restore_conditions(snapshot.conditions)
         self._outcome = float(snapshot.episodes.report[0, OUTCOME])
         own: list[np.ndarray] = [*core.episodes, core.memory, core.seen]
         for array, kept in zip(own, (*snapshot.episodes, *snapshot.egocentric), strict=True):

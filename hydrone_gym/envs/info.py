@@ -18,8 +18,11 @@ _KEYS = (*_BATCH, *(f"_{name}" for name in _BATCH))
 _TERM_KEYS = (*TERMS, *(f"_{name}" for name in TERMS))
 
 
-def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return what `info` always holds, from one row of `REPORT` and the crossings so far."""
+def info_of(
+    report: Sequence[float], transitions: Sequence[dict[str, Any]], weather: dict[str, NDArray[np.float64]]
+) -> dict[str, Any]:
+    """Return what `info` holds, from one row of `REPORT`, its crossings so far, and the weather around it (1,)."""
+    outdoors = {"weather": {name: values[0].tolist() for name, values in weather.items()}} if weather else {}
     return {
         "outcome": _OUTCOMES[int(report[OUTCOME])],
         "time": report[OUTCOME + 1],
@@ -27,6 +30,7 @@ def info_of(report: Sequence[float], transitions: Sequence[dict[str, Any]]) -> d
         "clearance": report[OUTCOME + 3],
         "transitions": [dict(crossing) for crossing in transitions],
         "reward_terms": dict(zip(TERMS, report)),
+        **outdoors,
     }
 
 
@@ -42,12 +46,15 @@ def crossings_of(log: NDArray[np.float64], count: int) -> list[dict[str, Any]]:
 
 
 def batch_info(
-    columns: NDArray[np.float64], transitions: np.ndarray, mask: NDArray[np.bool_] | None = None
+    columns: NDArray[np.float64],
+    transitions: np.ndarray,
+    weather: dict[str, NDArray[np.float64]],
+    mask: NDArray[np.bool_] | None = None,
 ) -> dict[str, Any]:
     """Return `info` for many rows, arrays with their masks as Gymnasium's vector environments give them.
 
-    `columns` (len(REPORT), n) are not copied, `transitions` (n,) are objects, a list of crossings a row. Rows that the
-    `mask` (n,) leaves out are zero, None for objects.
+    `columns` (len(REPORT), n) are not copied, `transitions` (n,) are objects, a list of crossings a row, `weather` is
+    what moves around the rows, empty if nothing does. Rows that the `mask` (n,) leaves out are zero, None for objects.
     """
     terms, crossings = len(TERMS), transitions.copy()
     masks = np.ones((terms + len(_BATCH), len(transitions)), bool)
@@ -56,4 +63,12 @@ def batch_info(
         masks[:], crossings[~mask] = mask, None
     reward_terms: dict[str, Any] = dict(zip(_TERM_KEYS, (*columns[:terms], *masks[:terms])))
     values = (columns[OUTCOME].astype(np.int64), *columns[OUTCOME + 1 : OUTCOME + 4], crossings, reward_terms)
-    return dict(zip(_KEYS, (*values, *masks[terms:]), strict=True))
+    info = dict(zip(_KEYS, (*values, *masks[terms:]), strict=True))
+    if weather:
+        there = np.ones(len(transitions), bool) if mask is None else mask
+        around: dict[str, Any] = {}
+        for name, numbers in weather.items():
+            shown = there.reshape(-1, *[1] * (numbers.ndim - 1))
+            around |= {name: np.where(shown, numbers, 0.0), f"_{name}": there.copy()}
+        info |= {"weather": around, "_weather": there.copy()}
+    return info

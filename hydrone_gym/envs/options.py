@@ -18,6 +18,7 @@ from gymnasium.vector import AutoresetMode
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.simulation.simulation import ticks_in
 from hydrone_gym.vehicle import Vehicle, named_vehicle
+from hydrone_gym.weather import Spread, Weather, named_weather
 from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw, prepare
 from hydrone_gym.world.world import World
 
@@ -48,6 +49,14 @@ class Options:
     obstacle_radius: tuple[float, float] = _option((0.5, 1.5), "least and greatest radius, m")
     sensor_range: float = _option(3.0, "m")
     vehicle: str | Vehicle = _option("paper", '"paper", "physical" or a `Vehicle`; kept as the latter')
+    weather: int | Weather = _option(
+        0, "a level, 0 (still air, flat water) to 5, or a `Weather`; kept as the latter; a scenario may carry another"
+    )
+    vehicle_spread: float | Spread | None = _option(
+        None,
+        "how far the vehicle of an episode may be from `vehicle`, which its controller and planners believe in: a "
+        "`Spread`, or a number for that share of mass, thrust, inertia and drag; None for that of the weather",
+    )
     controller: str = _option("paper", "name of the control law, one of `hydrone_gym.control.laws`")
     period: float = _option(0.5, "seconds a step, a multiple of 0.05")
     vertical_mode: bool = _option(True, "hold still laterally inside the transition zone")
@@ -87,6 +96,9 @@ class Options:
                 f"them all, got {draws.num_obstacles}"
             )
         object.__setattr__(self, "vehicle", vehicle)
+        object.__setattr__(self, "weather", named_weather(self.weather))
+        if self.vehicle_spread is not None:
+            object.__setattr__(self, "vehicle_spread", Spread.of(self.vehicle_spread))
         object.__setattr__(self, "num_obstacles", int(draws.num_obstacles))
         object.__setattr__(self, "obstacle_radius", draws.obstacle_radius)
         prepare(draws, self.world, vehicle.radius)
@@ -102,6 +114,16 @@ class Options:
         """What scenarios are drawn by at reset."""
         spheres: dict[str, Any] = {"num_obstacles": self.num_obstacles, "obstacle_radius": self.obstacle_radius}
         return replace(SCENARIO_LAWS[self.mission], **spheres)
+
+    def spread_in(self, weather: Weather) -> Spread:
+        """Return how far the vehicle of an episode in a weather may be from the nominal one."""
+        return Spread.of(weather.spread if self.vehicle_spread is None else self.vehicle_spread)
+
+    @property
+    def weathered(self) -> bool:
+        """Whether anything differs from the nominal vehicle in still air and flat water."""
+        exact = self.spread_in(self.weather) == Spread() and self.vehicle.ideal
+        return not (exact and self.weather.still)
 
     def differences(self, other: "Options") -> list[str]:
         """Return the names of the options, but for those of pictures, in which another environment differs."""

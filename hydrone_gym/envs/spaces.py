@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.perception.egocentric import LIMIT, OBSERVATION_SIZE
-from hydrone_gym.simulation.advance import RATE_BOUND, SPEED_BOUND, TICK
+from hydrone_gym.simulation.advance import RATE_BOUND, SPEED_BOUND
+from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.world.world import World
 

@@ -10,7 +10,7 @@ from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.envs.reward import TERMS, write_reward
 from hydrone_gym.perception.perceived import detect
-from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.outcome import RUNNING, TIMEOUT
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.simulation.storage import new_rows

@@ -93,12 +93,13 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         scenarios = [requested_scenario(each, self.simulation, bounds) for each in asked]
         scenarios = scenarios if several else scenarios * len(rows)
         self._seed(seed, rows)
-        self._core.begin(rows, self._core.missions_of(rows, scenarios))
+        self._core.begin(rows, self._core.missions_of(rows, scenarios), scenarios)
         if self.render_mode is not None:
             self._core.show(rows)
         observation = self._core.observation()
         begun = np.isin(np.arange(self.num_envs), rows)
-        return observation, batch_info(self._core.episodes.report.T, self._core.transitions, begun)
+        core = self._core
+        return observation, batch_info(core.episodes.report.T, core.transitions, core.weather(), begun)
 
     def _seed(self, seed: Any, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
@@ -111,6 +112,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         for row in rows:
             if seeds[row] is not None:
                 streams[row] = seeding.np_random(seeds[row])[0]
+                self._core.reseeded[row] = True
 
     def step(
         self, actions: ArrayLike
@@ -135,11 +137,11 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             core.show(core.starting.nonzero()[0])
         outcome = flown.report[OUTCOME]
         truncated, ended = outcome == TIMEOUT, outcome != RUNNING
-        info = batch_info(flown.now, core.transitions)
+        info = batch_info(flown.now, core.transitions, core.weather())
         if ended.any():
             last = {"is_success": outcome == GOAL, "_is_success": ended.copy()}
             if same_step:
-                last |= batch_info(flown.report, flown.last_transitions, ended)
+                last |= batch_info(flown.report, flown.last_transitions, flown.weather, ended)
                 last = {"final_info": last, "_final_info": ended.copy(), "final_obs": flown.last_observations}
                 last["_final_obs"] = ended.copy()
             info |= last

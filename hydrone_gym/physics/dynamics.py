@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates, to_body, to_world
 from hydrone_gym.physics.parameters import vehicle_params
-from hydrone_gym.physics.rotors import rotor_wrench
+from hydrone_gym.physics.rotors import rotor_thrusts, rotor_wrench
 from hydrone_gym.physics.trigonometry import wrap
 from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import HYDRONE, Vehicle, named_vehicle
@@ -33,10 +33,9 @@ def medium_at(vehicle, air):
 
 
 @inlined
-def acceleration(state, attitude, speeds, vehicle, medium, air):
-    """Return every acceleration but drag: rotors, gravity and buoyancy, gyroscopic and restoring moments."""
-    wrench = rotor_wrench(vehicle, medium, air, speeds)
-    gx, gy, gz = to_body(attitude, 0.0, 0.0, -medium.weight)
+def acceleration(state, attitude, wrench, force, vehicle, medium):
+    """Return every acceleration but drag: rotors, gyroscopic and restoring moments, and a force (N) in world axes."""
+    gx, gy, gz = to_body(attitude, force[0], force[1], force[2])
     tilt_pitch = attitude.s_theta * (1.0 + vehicle.restoring_roll_coupling * (attitude.c_phi - 1.0))
     p, q, r = state.p, state.q, state.r
     gyro_x = (vehicle.inertia_z - vehicle.inertia_y) * q * r
@@ -65,14 +64,27 @@ def damped(rate, gain, dt):
 @inlined
 def step(state, attitude, speeds, vehicle, medium, air, dt):
     """Advance the state by dt seconds at constant rotor speeds: drag implicit, all else explicit, one evaluation."""
-    a = acceleration(state, attitude, speeds, vehicle, medium, air)
+    wrench = rotor_wrench(vehicle, air, rotor_thrusts(medium, speeds))
+    a = acceleration(state, attitude, wrench, (0.0, 0.0, -medium.weight), vehicle, medium)
+    return integrate(state, attitude, a, medium, None, dt)
+
+
+@inlined
+def integrate(state, attitude, a, medium, fluid, dt):
+    """Advance the state by dt seconds under a `BodyAcceleration`, with implicit drag.
+
+    `fluid` is the velocity of what surrounds the vehicle, in body axes (m/s): drag works on the velocity relative to
+    it. None stands for a fluid at rest.
+    """
     bx, by, bz = to_body(attitude, state.vx, state.vy, state.vz)
-    vx, vy, vz = to_world(
-        attitude,
-        damped(bx + dt * a.x, medium.drag_x, dt),
-        damped(by + dt * a.y, medium.drag_y, dt),
-        damped(bz + dt * a.z, medium.drag_z, dt),
-    )
+    bx, by, bz = bx + dt * a.x, by + dt * a.y, bz + dt * a.z
+    if fluid is None:
+        bx, by, bz = damped(bx, medium.drag_x, dt), damped(by, medium.drag_y, dt), damped(bz, medium.drag_z, dt)
+    else:
+        bx = damped(bx - fluid[0], medium.drag_x, dt) + fluid[0]
+        by = damped(by - fluid[1], medium.drag_y, dt) + fluid[1]
+        bz = damped(bz - fluid[2], medium.drag_z, dt) + fluid[2]
+    vx, vy, vz = to_world(attitude, bx, by, bz)
     p = damped(state.p + dt * a.roll, medium.rotational_drag_x, dt)
     q = damped(state.q + dt * a.pitch, medium.rotational_drag_y, dt)
     r = damped(state.r + dt * a.yaw, medium.rotational_drag_z, dt)
@@ -101,7 +113,8 @@ def _derivative(values, rotor_speed, vehicle, out):
     air = is_air(state.z)
     medium = medium_at(vehicle, air)
     attitude = attitude_of(state)
-    a = acceleration(state, attitude, speeds, vehicle, medium, air)
+    wrench = rotor_wrench(vehicle, air, rotor_thrusts(medium, speeds))
+    a = acceleration(state, attitude, wrench, (0.0, 0.0, -medium.weight), vehicle, medium)
     bx, by, bz = to_body(attitude, state.vx, state.vy, state.vz)
     out[0], out[1], out[2] = state.vx, state.vy, state.vz
     out[3], out[4], out[5] = euler_rates(attitude, state.p, state.q, state.r)

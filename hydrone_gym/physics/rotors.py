@@ -22,12 +22,15 @@ def thrust(medium, speed):
 
 
 @inlined
-def rotor_wrench(vehicle, medium, air, speeds):
-    """Return the `Wrench` of four rotor speeds (rpm): all lift in air; in water 1 and 3 lift, 2 and 4 drive."""
-    f1 = thrust(medium, speeds[0])
-    f2 = thrust(medium, speeds[1])
-    f3 = thrust(medium, speeds[2])
-    f4 = thrust(medium, speeds[3])
+def rotor_thrusts(medium, speeds):
+    """Return the thrusts of four rotor speeds (rpm) in N."""
+    return thrust(medium, speeds[0]), thrust(medium, speeds[1]), thrust(medium, speeds[2]), thrust(medium, speeds[3])
+
+
+@inlined
+def rotor_wrench(vehicle, air, thrusts):
+    """Return the `Wrench` of four thrusts (N): all lift in air; in water 1 and 3 lift, 2 and 4 drive."""
+    f1, f2, f3, f4 = thrusts
     lift = f1 + f3
     drive = f2 + f4
     differential = vehicle.arm * (f2 - f4)

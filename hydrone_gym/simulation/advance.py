@@ -17,9 +17,14 @@ from hydrone_gym.control.law import control
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.control.reference import Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
+from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, immersed_step, lagged
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
+from hydrone_gym.physics.parameters import VehicleParams
 from hydrone_gym.physics.rotors import shaft_power
 from hydrone_gym.physics.trigonometry import wrap
+from hydrone_gym.simulation.clock import DT, SUBSTEPS, TICK
+from hydrone_gym.simulation.conditions import AT as CONDITIONS_AT
+from hydrone_gym.simulation.conditions import Noticed, any_irregular, sample
 from hydrone_gym.simulation.outcome import COLLISION, DIVERGED, GOAL, OUT_OF_BOUNDS, ROUGH_TRANSITION, RUNNING
 from hydrone_gym.simulation.storage import (
     AT,
@@ -43,9 +48,6 @@ from hydrone_gym.simulation.storage import (
 from hydrone_gym.surface import is_air
 from hydrone_gym.world.bodies import inverse_square, path_distance
 
-DT = 0.01  # s: physics and control
-SUBSTEPS = 5  # physics steps a tick
-TICK = DT * SUBSTEPS  # s: collision, sensing and outcome
 # Beyond these the model means nothing any more, and the outcome is DIVERGED.
 SPEED_BOUND = 30.0  # m/s
 RATE_BOUND = 100.0  # rad/s
@@ -69,38 +71,87 @@ def reference_at(b, i, lanes, fraction, inverse_period):
 
 
 @inlined
-def substep(b, i, lanes, fraction, inverse_period, model):
-    """Advance lane i by one physics step; `fraction` is how far the reference has moved by its end."""
+def substep(b, i, lanes, part, inverses, model, weather):
+    """Advance lane i by one physics step: `part` is how many of a period's are flown at its end, and of the tick's.
+
+    In still air and flat water `weather` is None, and the vehicle is what its controller takes it to be.
+    """
     state = gather(b, FLOWN_AT.state, i, lanes, State)
     integral = gather(b, FLOWN_AT.integral, i, lanes, Integral)
     attitude = attitude_of(state)
-    air = is_air(state.z)
+    air = is_air(state.z) if weather is None else gather(weather, CONDITIONS_AT.noticed + 1, i, lanes, float) > 0.0
     medium = medium_at(model.vehicle, air)
     vertical = abs(state.z) <= model.world.zone and model.world.vertical_mode > 0.0
     rates = euler_rates(attitude, state.p, state.q, state.r)
-    reference = reference_at(b, i, lanes, fraction, inverse_period)
+    reference = reference_at(b, i, lanes, part[0] * inverses[0], inverses[1])
     now = Instant(state, attitude, rates, reference, vertical, air, medium)
     speeds, integral = control(now, integral, model, DT)
-    new = step(state, attitude, speeds, model.vehicle, medium, air, DT)
-    scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + shaft_power(medium, speeds) * DT)
-    crossed = air != is_air(new.z)
-    scatter(b, FLOWN_AT.integral, i, lanes, select(crossed, zero_like(integral), integral))
+    if weather is None:
+        new = step(state, attitude, speeds, model.vehicle, medium, air, DT)
+        power = shaft_power(medium, speeds)
+        noticed = air != is_air(new.z)
+        note_crossing(b, i, lanes, noticed, is_air(new.z), (new.vx, new.vy, new.vz), attitude)
+    else:
+        new, power, noticed = weathered_step(b, i, lanes, now, speeds, part[1], weather)
+    scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + power * DT)
+    scatter(b, FLOWN_AT.integral, i, lanes, select(noticed, zero_like(integral), integral))
     scatter(b, FLOWN_AT.state, i, lanes, new)
-    note_crossing(b, i, lanes, crossed, new, attitude)
 
 
 @inlined
-def note_crossing(b, i, lanes, crossed, new, attitude):
-    """Remember this tick's crossing: its last direction and its worst lateral speed and tilt."""
-    speed2 = new.vx * new.vx + new.vy * new.vy
+def weathered_step(b, i, lanes, now, wanted, sub, weather):
+    """Advance lane i as the vehicle really is, in its weather; `sub` counts the tick's physics steps at its end.
+
+    Returns the new state, the rotors' shaft power (W), and whether the controller now notices another medium.
+    """
+    state, attitude, driven = now.state, now.attitude, now.air
+    vehicle = gather(weather, CONDITIONS_AT.vehicle, i, lanes, VehicleParams)
+    real = gather(weather, CONDITIONS_AT.real, i, lanes, Unmodelled)
+    rotors = gather(weather, CONDITIONS_AT.rotors, i, lanes, Rotors)
+    fluid = gather(weather, CONDITIONS_AT.fluid, i, lanes, Fluid)
+    noticed = gather(weather, CONDITIONS_AT.noticed, i, lanes, Noticed)
+    speeds = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
+    after = sub * DT - 0.5 * TICK  # the end of this step, from the middle of the tick
+    new, medium = immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after - DT, DT)
+    air = is_air(new.z - (fluid.elevation + after * fluid.elevation_rate))
+    crossed = air != (noticed.air > 0.0)
+    water = (
+        fluid.water_x + after * fluid.water_rate_x,
+        fluid.water_y + after * fluid.water_rate_y,
+        fluid.water_z + after * fluid.water_rate_z,
+    )
+    note_crossing(b, i, lanes, crossed, air, (new.vx - water[0], new.vy - water[1], new.vz - water[2]), attitude)
+    waited = noticed.waited + DT if air != driven else 0.0
+    turned = waited > real.medium_delay
+    driven_now = air if turned else driven
+    scatter(
+        weather,
+        CONDITIONS_AT.noticed,
+        i,
+        lanes,
+        Noticed(1.0 if air else 0.0, 1.0 if driven_now else 0.0, 0.0 if turned else waited),
+    )
+    # the rotors of the other medium start from rest
+    later = lagged(rotors, wanted, real.keep_air if driven else real.keep_water)
+    scatter(weather, CONDITIONS_AT.rotors, i, lanes, select(turned, zero_like(later), later))
+    return new, shaft_power(medium, speeds), turned
+
+
+@inlined
+def note_crossing(b, i, lanes, crossed, air, velocity, attitude):
+    """Remember this tick's crossing: its last direction and its worst lateral speed and tilt.
+
+    `velocity` (x, y, z in m/s) is that of the vehicle relative to the water.
+    """
+    speed2 = velocity[0] * velocity[0] + velocity[1] * velocity[1]
     cosine = attitude.c_phi * attitude.c_theta
     c = gather(b, LANE_AT.crossing, i, lanes, Crossing)
     noted = Crossing(
         c.number + (1.0 if crossed else 0.0),
-        (1.0 if is_air(new.z) else -1.0) if crossed else c.direction,
+        (1.0 if air else -1.0) if crossed else c.direction,
         speed2 if crossed and not speed2 <= c.speed2 else c.speed2,
         cosine if crossed and not cosine >= c.cos_tilt else c.cos_tilt,
-        new.vz if crossed else c.vz,
+        velocity[2] if crossed else c.vz,
     )
     scatter(b, LANE_AT.crossing, i, lanes, noted)
 
@@ -202,7 +253,7 @@ def log_crossings(b, lanes):
 
 
 @inlined
-def advance(b, lanes, obstacles, closest, count, model, part):
+def advance(b, lanes, obstacles, closest, count, model, part, weather):
     """Advance all lanes through a part of a period.
 
     Args:
@@ -213,19 +264,23 @@ def advance(b, lanes, obstacles, closest, count, model, part):
         count: number of obstacles.
         model: `Model`.
         part: (first, last, ticks): ticks [first, last) of a period of `ticks` ticks.
+        weather: the lanes' `Conditions`, or None for the nominal vehicle in still air and flat water.
     """
     first, last, ticks = part
-    inverse_substeps = 1.0 / (ticks * SUBSTEPS)
-    inverse_period = 1.0 / (ticks * TICK)
+    inverses = (1.0 / (ticks * SUBSTEPS), 1.0 / (ticks * TICK))
     # all lanes; were it a constant to LLVM, it would unroll the short loops to scalars before it could vectorise them
     width = lanes if lanes == 1 or ticks > 0 else 0
     for tick in range(first, last):
         for i in range(width):
             begin_tick(b, i, lanes)
+        if weather is not None:
+            irregular = any_irregular(weather, lanes)
+            for i in range(width):
+                sample(weather, i, lanes, b, irregular)
         for sub in range(SUBSTEPS):
-            fraction = (tick * SUBSTEPS + sub + 1) * inverse_substeps
+            part = (tick * SUBSTEPS + sub + 1, sub + 1)
             for i in range(lanes):
-                substep(b, i, lanes, fraction, inverse_period, model)
+                substep(b, i, lanes, part, inverses, model, weather)
         for i in range(width):
             measure_path(b, i, lanes)
         for j in range(count):
@@ -237,16 +292,20 @@ def advance(b, lanes, obstacles, closest, count, model, part):
 
 
 @functools.cache
-def compiled(law: str, lanes: int) -> Any:
-    """Return `advance` compiled for a law and a number of lanes; its `address` is what kernels call.
+def compiled(law: str, lanes: int, weathered: bool = False) -> Any:
+    """Return `advance` compiled for a law and a number of lanes, with weather or without.
 
-    Called as ``call(address, block, obstacles, closest, values, count, first, last, ticks)``.
+    Its `address` is what kernels call, ``call(address, block, obstacles, closest, weather, values, count, first, last,
+    ticks)``; without weather that pointer is never read.
     """
     gains = named_law(law).gains
 
-    def unit_of_law(block, obstacles, closest, values, count, first, last, ticks):
-        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks))
+    def unit_of_law(block, obstacles, closest, weather, values, count, first, last, ticks):
+        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks), None)
+
+    def unit_with_weather(block, obstacles, closest, weather, values, count, first, last, ticks):
+        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks), weather)
 
     numbers, whole = types.CPointer(types.float64), types.int64
-    signature = types.void(numbers, numbers, numbers, numbers, whole, whole, whole, whole)
-    return unit(signature, unit_of_law, __name__, gains.__module__)
+    signature = types.void(numbers, numbers, numbers, numbers, numbers, whole, whole, whole, whole)
+    return unit(signature, unit_with_weather if weathered else unit_of_law, __name__, gains.__module__)

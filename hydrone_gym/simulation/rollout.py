@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel, routine
 from hydrone_gym._memory import call, gather, pointer, scatter
-from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.rows import Engine, advance_rows, set_move
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.simulation import STILL, Simulation
 from hydrone_gym.simulation.storage import (
     AT,
     CROSSINGS,
@@ -136,7 +136,7 @@ def propagate(lane, start, end, goal, reference):
     scatter(b, AT.episode, 0, 1, Episode(0.0, np.inf, np.float64(RUNNING), 0.0))
     new = Pose(reference[0], reference[1], reference[2], reference[3])
     set_move(b, 0, 1, new)
-    call(lane.address, b, lane.obstacles, lane.closest, lane.values, lane.number, 0, lane.ticks, lane.ticks)
+    call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, 0, lane.ticks, lane.ticks)
     for k in range(REFERENCE):
         end[k] = b[k]
     scatter(end, REFERENCE, 0, 1, new)
@@ -180,7 +180,8 @@ class Flock:
         """Fly all of them for one period, each toward its reference of (count, 4); m and rad."""
         references = np.ascontiguousarray(references, np.float64)
         ticks = self._engine.ticks
-        advance_rows(self._engine, self.rows, references, self._obstacles, self._closest, self._count, 0, ticks)
+        around = (self._obstacles, self._closest, STILL)
+        advance_rows(self._engine, self.rows, references, *around, self._count, 0, ticks)
 
 
 __all__ = ["Flock", "Lane", "Result", "Rollout", "lane_of", "propagate"]

@@ -46,7 +46,7 @@ def logged(row):
 
 
 @kernel
-def advance_rows(engine, rows, references, obstacles, closest, count, first, last):
+def advance_rows(engine, rows, references, obstacles, closest, weather, count, first, last):
     """Advance rows in place through ticks [first, last) of a period, a block of lanes at a time.
 
     Args:
@@ -55,6 +55,7 @@ def advance_rows(engine, rows, references, obstacles, closest, count, first, las
         references: (n, 4) what the reference moves to by the end of the period: m, m, m, rad.
         obstacles: (blocks, 4 * count * lanes) lane-major, see `advance`.
         closest: (blocks, count * lanes), updated.
+        weather: (blocks, CONDITIONS * lanes) the `Conditions` of the lanes, updated; (1, 0) for a kernel without.
         count: number of obstacles.
         first, last: which part of the period; the rows' references move on when last is its end.
     """
@@ -69,7 +70,9 @@ def advance_rows(engine, rows, references, obstacles, closest, count, first, las
             for c in range(LOG, LOG + logged(source)):
                 b[c * lanes + i] = source[c]
             set_move(b, i, lanes, gather(references[row], 0, 0, 1, Pose))
-        call(engine.address, engine.block, obstacles[k], closest[k], engine.values, count, first, last, engine.ticks)
+        around = weather[min(k, weather.shape[0] - 1)]
+        part = (obstacles[k], closest[k], around, engine.values, count, first, last, engine.ticks)
+        call(engine.address, engine.block, *part)
         for i in range(min(lanes, n - start)):
             target = pointer(rows[start + i])
             scatter(target, 0, 0, 1, gather(b, 0, i, lanes, Row))

@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.control.laws import named_law
-from hydrone_gym.simulation.advance import DT, SUBSTEPS, TICK, compiled
+from hydrone_gym.simulation.advance import compiled
+from hydrone_gym.simulation.clock import DT, SUBSTEPS, TICK
 from hydrone_gym.simulation.rows import Engine, advance_rows
 from hydrone_gym.simulation.storage import LANES, new_block, new_rows, pack_model
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.world.world import World
+
+STILL = np.zeros((1, 0))  # the weather of a simulation without
 
 
 def ticks_in(period: float) -> int:
@@ -30,12 +33,22 @@ class Simulation:
         period: seconds between references, a multiple of 0.05.
         lanes: 1 for a single row, 16 for batches.
         law: name of the control law that flies it.
+        weathered: whether rows have `Conditions`, their weather and the vehicle as it is; without, `vehicle` flies as
+            its controller believes it to be, in still air and flat water.
 
     Raises:
         ValueError: a period that is no multiple of the tick, an unknown law.
     """
 
-    def __init__(self, vehicle: Vehicle, world: World, period: float = 0.5, lanes: int = 1, law: str = "paper") -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        world: World,
+        period: float = 0.5,
+        lanes: int = 1,
+        law: str = "paper",
+        weathered: bool = False,
+    ) -> None:
         """Pack the model."""
         self.vehicle = vehicle
         self.world = world
@@ -43,6 +56,7 @@ class Simulation:
         self.ticks = ticks_in(period)
         self.lanes = lanes
         self.law = law
+        self.weathered = weathered
         self.values = pack_model(vehicle, world, named_law(law))
         self._engine: Engine | None = None
 
@@ -50,13 +64,14 @@ class Simulation:
     def engine(self) -> Engine:
         """What kernels advance blocks with; compiled, or loaded, when it is first asked for."""
         if self._engine is None:
-            address = compiled(self.law, self.lanes).address
+            address = compiled(self.law, self.lanes, self.weathered).address
             self._engine = Engine(address, self.lanes, self.ticks, self.values, new_block(self.lanes))
         return self._engine
 
-    def twin(self) -> Self:
-        """Return another simulation of the same model, with working storage of its own."""
-        return type(self)(self.vehicle, self.world, self.period, self.lanes, self.law)
+    def twin(self, weathered: bool | None = None) -> Self:
+        """Return another simulation of the same model, with storage of its own; `weathered` as before unless given."""
+        outdoors = self.weathered if weathered is None else weathered
+        return type(self)(self.vehicle, self.world, self.period, self.lanes, self.law, outdoors)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what holds for this process only: the kernel's address."""
@@ -71,12 +86,13 @@ class Simulation:
         count: int,
         first: int = 0,
         last: int | None = None,
+        weather: NDArray[np.float64] = STILL,
     ) -> None:
         """Advance rows in place through ticks [first, last) of a period; see `advance_rows` for the layout."""
         if references.dtype != np.float64 or not references.flags.c_contiguous:
             references = np.ascontiguousarray(references, np.float64)
         end = self.ticks if last is None else last
-        advance_rows(self._engine or self.engine, rows, references, obstacles, closest, count, first, end)
+        advance_rows(self._engine or self.engine, rows, references, obstacles, closest, weather, count, first, end)
 
 
 def trajectory(

@@ -5,3 +5,7 @@ wind        a mean and Dryden gusts
 current     a mean and a Gauss-Markov variation
 waves       regular, or a few components of a JONSWAP spectrum
 """
+
+from hydrone_gym.weather.weather import Spread, Weather, named_weather
+
+__all__ = ["Spread", "Weather", "named_weather"]

@@ -1,6 +1,6 @@
 """Current: a mean and a Gauss-Markov variation about it, horizontal, the same at every depth.
 
-    u̇ = −μ (u − ū) + noise,      stepped exactly:  u⁺ − ū = e^(−μ dt) (u − ū) + σ √(1 − e^(−2 μ dt)) N(0, 1)
+u̇ = −μ (u − ū) + noise,      stepped exactly:  u⁺ − ū = e^(−μ dt) (u − ū) + σ √(1 − e^(−2 μ dt)) N(0, 1)
 """
 
 import math

@@ -12,6 +12,7 @@ cosh k(z + h) / sinh kh = (e^(kz) + q e^(−kz)) / (1 − q).
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -108,7 +109,7 @@ def sea_params(height: float, period: float, irregular: bool, depth: float) -> S
     energy = np.cumsum(jonswap(grid, omega))
     edges = np.interp(np.linspace(0.0, energy[-1], COMPONENTS + 1), energy, grid).tolist()
     amplitude = height / 4.0 * math.sqrt(2.0 / COMPONENTS)
-    bands = [Band(amplitude, low, high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    bands = [Band(amplitude, low, high) for low, high in pairwise(edges)]
     return SeaParams(*bands, depth)
 
 

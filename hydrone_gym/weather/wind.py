@@ -9,9 +9,9 @@ The spectra belong to the filters
 
     u: 1 / (1 + τ s)      v, w: (1 + √3 τ s) / (1 + τ s)²      τ = L / W
 
-which are stepped exactly, at any time step: with x₁ the first-order filter at unit variance and x₂ the same filter once
-more, v = (√3 x₁ + (1 − √3) x₂) / √2 has unit variance too. The time scale is that of gusts carried past a fixed point by
-the mean wind W: the weather of an episode does not depend on how the vehicle flies through it.
+which are stepped exactly, at any time step: with x₁ the first-order filter at unit variance and x₂ the same filter
+once more, v = (√3 x₁ + (1 − √3) x₂) / √2 has unit variance too. The time scale is that of gusts carried past a fixed
+point by the mean wind W: the weather of an episode does not depend on how the vehicle flies through it.
 """
 
 import math

@@ -3,12 +3,13 @@
 import json
 import math
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hydrone_gym.weather import Spread, Weather
 from hydrone_gym.world.world import World
 
 FORMAT = "hydrone_gym scenario"
@@ -26,6 +27,7 @@ class Scenario:
     goal: tuple[float, float, float]  #: x, y, z in m
     obstacles: np.ndarray  #: (M, 4) read-only float64, a sphere [x, y, z, r] in m a row; any nested sequence is copied
     name: str = ""  #: what to call it in tables; counts as part of the value
+    weather: Weather | None = None  #: that of the environment if None
 
     def __post_init__(self) -> None:
         """Bring every field to its one form: tuples of float, and an own read-only array."""
@@ -50,6 +52,8 @@ class Scenario:
         object.__setattr__(self, "obstacles", obstacles)
         if not isinstance(self.name, str):
             raise ValueError(f"Scenario.name must be a string, got {self.name!r}")
+        if self.weather is not None and not isinstance(self.weather, Weather):
+            raise ValueError(f"Scenario.weather must be a Weather or None, got {self.weather!r}")
 
     @property
     def media(self) -> tuple[str, str]:
@@ -59,8 +63,10 @@ class Scenario:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Scenario):
             return NotImplemented
-        same_ends = self.start == other.start and self.goal == other.goal and self.name == other.name
-        return same_ends and np.array_equal(self.obstacles, other.obstacles)
+        own = self.start, self.goal, self.name, self.weather
+        return own == (other.start, other.goal, other.name, other.weather) and np.array_equal(
+            self.obstacles, other.obstacles
+        )
 
     def __hash__(self) -> int:
         return hash((self.start, self.goal, self.name, len(self.obstacles)))
@@ -116,6 +122,9 @@ def save_scenario(scenario: Scenario, path: str | Path) -> None:
     Raises ValueError naming the path for a number that is not finite, and OSError when the file cannot be written.
     """
     content = {"format": FORMAT, "version": VERSION, **vars(scenario), "obstacles": scenario.obstacles.tolist()}
+    del content["weather"]
+    if scenario.weather is not None:
+        content["weather"] = asdict(scenario.weather)
     try:
         text = json.dumps(content, indent=1, allow_nan=False)
     except ValueError:
@@ -145,6 +154,8 @@ def _parse(text: str) -> Scenario:
     if content.get("version") != VERSION:
         raise ValueError(f'"version" must be {VERSION}, got {content.get("version")!r}')
     known = {"format", "version", *(spec.name for spec in fields(Scenario))}
+    if "weather" not in content:  # most scenarios leave it to the environment
+        known.remove("weather")
     for problem, keys in (("missing", known - content.keys()), ("unknown", content.keys() - known)):
         if keys:
             raise ValueError(f"{problem} key {', '.join(map(repr, sorted(keys)))}")
@@ -156,4 +167,17 @@ def _parse(text: str) -> Scenario:
         # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
         if not numbers or not all(abs(entry) <= sys.float_info.max for entry in row):
             raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
-    return Scenario(**{key: content[key] for key in known - {"format", "version"}})
+    given = {key: content[key] for key in known - {"format", "version"}}
+    if "weather" in given:
+        given["weather"] = _weather_of(given["weather"])
+    return Scenario(**given)
+
+
+def _weather_of(content: Any) -> Weather:
+    """Rebuild a weather from what `dataclasses.asdict` made of it; ValueError says what is wrong."""
+    if not isinstance(content, dict) or not isinstance(content.get("spread"), dict):
+        raise ValueError(f'"weather" must be an object with a "spread", got {content!r}')
+    try:
+        return Weather(**{**content, "spread": Spread(**content["spread"])})
+    except TypeError as error:
+        raise ValueError(f"weather: {error}") from None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined, kernel
 from hydrone_gym._memory import pointer, scatter, view
 from hydrone_gym.control.envelope import Envelope
-from hydrone_gym.simulation.advance import TICK
+from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go

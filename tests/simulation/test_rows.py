@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hydrone_gym.simulation.advance import SPEED_BOUND, TICK
+from hydrone_gym.simulation.advance import SPEED_BOUND
+from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.rows import advance_rows
 from hydrone_gym.simulation.simulation import Simulation, row_at, ticks_in, trajectory

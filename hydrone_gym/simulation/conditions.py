@@ -1,0 +1,371 @@
+"""The conditions a lane flies in: the vehicle as it is, and the weather around it.
+
+They lie beside the lanes like the obstacles do, number k of lane i at ``k * lanes + i``, and only the kernel for
+weather reads them. `begin_conditions` draws those of an episode from its key; `sample` moves the weather on by a tick.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrone_gym._jit import inlined, kernel
+from hydrone_gym._memory import gather, offsets_of, packed, pointer, scatter, size_of, unpacked
+from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, near_water_factor, unmodelled_of
+from hydrone_gym.physics.kinematics import State
+from hydrone_gym.physics.parameters import Hull, VehicleParams, hull_of, params_of
+from hydrone_gym.simulation.clock import DT, TICK
+from hydrone_gym.simulation.storage import FLOWN_AT, TICKS
+from hydrone_gym.surface import is_air
+from hydrone_gym.vehicle import Vehicle
+from hydrone_gym.weather import current as currents
+from hydrone_gym.weather import waves
+from hydrone_gym.weather import wind as winds
+from hydrone_gym.weather.current import CurrentParams, Eddies
+from hydrone_gym.weather.noise import Key, derived, normals, uniforms
+from hydrone_gym.weather.waves import Sea, SeaParams
+from hydrone_gym.weather.weather import Spread, Weather
+from hydrone_gym.weather.wind import Gusts, WindParams
+
+# Which pairs of an episode's key are for what.
+_DIRECTIONS, _VEHICLE, _GUSTS, _EDDIES, _WAVES, _TICKS = 0.0, 2.0, 10.0, 13.0, 14.0, 64.0
+_A_TICK = 4.0  # pairs that a tick takes
+_WEATHER = 1  # the child of a seed that is for weather
+
+
+class Heading(NamedTuple):
+    """Where something runs to: cosine and sine of its direction, from +x to +y."""
+
+    cosine: float
+    sine: float
+
+
+class Headings(NamedTuple):
+    """Where wind, current and waves run to."""
+
+    wind: Heading
+    current: Heading
+    waves: Heading
+
+
+class Noticed(NamedTuple):
+    """Which medium the vehicle is in, and which one its controller takes it to be in; 1 for air."""
+
+    air: float
+    driven: float
+    waited: float  # s that they have differed
+
+
+class Stream(NamedTuple):
+    """Where the keys of a row's episodes come from."""
+
+    key: Key
+    episodes: float  # begun so far
+
+
+class Conditions(NamedTuple):
+    """The conditions of one lane."""
+
+    vehicle: VehicleParams
+    real: Unmodelled
+    rotors: Rotors
+    noticed: Noticed
+    fluid: Fluid
+    gusts: Gusts
+    eddies: Eddies
+    key: Key
+    wind: WindParams
+    current: CurrentParams
+    headings: Headings
+    sea: Sea
+    stream: Stream
+
+
+class SpreadParams(NamedTuple):
+    """`hydrone_gym.weather.Spread` as numbers: relative half-widths, and ranges."""
+
+    mass: float
+    thrust: float
+    inertia: float
+    drag: float
+    lag_air_low: float
+    lag_air_high: float
+    lag_water_low: float
+    lag_water_high: float
+    rotor_drag_low: float
+    rotor_drag_high: float
+    height_low: float
+    height_high: float
+
+
+class Climate(NamedTuple):
+    """What the conditions of episodes are drawn from: a vehicle, its spread, and a weather."""
+
+    hull: Hull
+    spread: SpreadParams
+    wind: WindParams
+    current: CurrentParams
+    sea: SeaParams
+    wind_direction: float  # rad; not a number if it is drawn
+    current_direction: float
+    wave_direction: float
+
+
+AT = offsets_of(Conditions)
+CONDITIONS = size_of(Conditions)
+CLIMATE = size_of(Climate)
+_RADIUS = offsets_of(Unmodelled).near_water_radius
+_SECOND = AT.sea + offsets_of(Sea).second  # amplitude of a sea's second component
+
+
+def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float) -> np.ndarray:
+    """Pack what episodes of a vehicle in a weather are drawn from, over water of a depth (m)."""
+    own = vehicle.rotor_lag_air, vehicle.rotor_lag_water, vehicle.rotor_drag, vehicle.height
+    given = spread.rotor_lag_air, spread.rotor_lag_water, spread.rotor_drag, spread.height
+    ranges = [end for value, pair in zip(own, given, strict=True) for end in (pair or (value, value))]
+    directions = weather.wind_direction, weather.current_direction, weather.wave_direction
+    return packed(
+        Climate(
+            hull_of(vehicle),
+            SpreadParams(spread.mass, spread.thrust, spread.inertia, spread.drag, *ranges),
+            winds.wind_params(weather.wind, weather.turbulence, weather.shear, TICK),
+            currents.current_params(weather.current, weather.current_variation, TICK),
+            waves.sea_params(weather.wave_height, weather.wave_period, weather.sea == "jonswap", depth),
+            *(math.nan if direction is None else direction for direction in directions),
+        )
+    )
+
+
+@inlined
+def _heading(direction, share):
+    """The heading of a direction (rad), drawn by a uniform number if it is not a number."""
+    angle = 2.0 * math.pi * share if math.isnan(direction) else direction
+    return Heading(math.cos(angle), math.sin(angle))
+
+
+@inlined
+def _factor(width, share):
+    return 1.0 + width * (2.0 * share - 1.0)
+
+
+@inlined
+def _within(low, high, share):
+    return low + (high - low) * share
+
+
+@inlined
+def _hull_of_episode(hull, spread, key):
+    """Draw the vehicle of an episode."""
+    mass, air = uniforms(key, _VEHICLE)
+    water, inertia_x = uniforms(key, _VEHICLE + 1.0)
+    inertia_y, inertia_z = uniforms(key, _VEHICLE + 2.0)
+    drag, turning = uniforms(key, _VEHICLE + 3.0)
+    lag_air, lag_water = uniforms(key, _VEHICLE + 4.0)
+    flapping, height = uniforms(key, _VEHICLE + 5.0)
+    in_air, in_water = _factor(spread.thrust, air), _factor(spread.thrust, water)
+    moving, rotating = _factor(spread.drag, drag), _factor(spread.drag, turning)
+    return Hull(
+        hull.mass * _factor(spread.mass, mass),
+        hull.gravity,
+        hull.arm,
+        hull.yaw_arm_air,
+        hull.inertia_x * _factor(spread.inertia, inertia_x),
+        hull.inertia_y * _factor(spread.inertia, inertia_y),
+        hull.inertia_z * _factor(spread.inertia, inertia_z),
+        hull.volume,
+        hull.buoyancy_offset,
+        hull.restoring_mass_share,
+        hull.restoring_roll_coupling,
+        hull.added_mass * moving,
+        hull.added_inertia * rotating,
+        hull.drag_x * moving,
+        hull.drag_y * moving,
+        hull.drag_z * moving,
+        hull.rotational_drag_x * rotating,
+        hull.rotational_drag_y * rotating,
+        hull.rotational_drag_z * rotating,
+        hull.thrust_air * in_air,
+        hull.thrust_water * in_water,
+        hull.torque_air * in_air,
+        hull.torque_water * in_water,
+        hull.rotor_limit_air,
+        hull.rotor_limit_water,
+        hull.radius,
+        _within(spread.height_low, spread.height_high, height),
+        _within(spread.lag_air_low, spread.lag_air_high, lag_air),
+        _within(spread.lag_water_low, spread.lag_water_high, lag_water),
+        _within(spread.rotor_drag_low, spread.rotor_drag_high, flapping),
+        hull.thrust_water_curve_0 * in_water,
+        hull.thrust_water_curve_1 * in_water,
+        hull.thrust_water_curve_2 * in_water,
+        hull.near_water_radius,
+        hull.medium_delay,
+        hull.hover_speed,
+    )
+
+
+@inlined
+def _begin(memory, i, lanes, row, climate):
+    """Draw the conditions of the episode that lane i begins."""
+    stream = gather(memory, AT.stream, i, lanes, Stream)
+    key = derived(stream.key, stream.episodes)
+    scatter(memory, AT.stream, i, lanes, Stream(stream.key, stream.episodes + 1.0))
+    scatter(memory, AT.key, i, lanes, key)
+    hull = _hull_of_episode(climate.hull, climate.spread, key)
+    vehicle = params_of(hull)
+    scatter(memory, AT.vehicle, i, lanes, vehicle)
+    scatter(memory, AT.real, i, lanes, unmodelled_of(hull, DT))
+    to_wind, to_current = uniforms(key, _DIRECTIONS)
+    to_waves, _ = uniforms(key, _DIRECTIONS + 1.0)
+    headings = Headings(
+        _heading(climate.wind_direction, to_wind),
+        _heading(climate.current_direction, to_current),
+        _heading(climate.wave_direction, to_waves),
+    )
+    scatter(memory, AT.headings, i, lanes, headings)
+    scatter(memory, AT.wind, i, lanes, climate.wind)
+    scatter(memory, AT.current, i, lanes, climate.current)
+    scatter(memory, AT.gusts, i, lanes, winds.first_gusts(key, _GUSTS))
+    scatter(memory, AT.eddies, i, lanes, currents.first_eddies(key, _EDDIES))
+    sea = waves.draw_sea(climate.sea, headings.waves, key, _WAVES)
+    scatter(memory, AT.sea, i, lanes, sea)
+    place = (row.state[0], row.state[1], row.state[2])
+    swell = _add_rest(waves.add_wave(waves.calm(), sea.first, place, (0.0, 0.0), 0.0), sea, place, (0.0, 0.0), 0.0)
+    gusts, profile = gather(memory, AT.gusts, i, lanes, Gusts), winds.shear_profile(place[2], climate.wind.shear)
+    wind = winds.velocity(gusts, climate.wind, headings.wind, profile)
+    eddies = gather(memory, AT.eddies, i, lanes, Eddies)
+    flow = currents.velocity(eddies, climate.current, headings.current)
+    scatter(memory, AT.fluid, i, lanes, _fluid(wind, wind, flow, flow, swell, 1.0))
+    air = 1.0 if is_air(place[2] - swell.elevation) else 0.0
+    scatter(memory, AT.noticed, i, lanes, Noticed(air, air, 0.0))
+    # its rotors hold it already: four in air, the two that lift in water
+    lifting = vehicle.hover_speed if air > 0.0 else -np.sqrt(abs(vehicle.water.weight) / (2.0 * vehicle.water.thrust))
+    driving = lifting if air > 0.0 else 0.0
+    scatter(memory, AT.rotors, i, lanes, Rotors(lifting, driving, lifting, driving))
+
+
+@inlined
+def _add_rest(swell, sea, place, velocity, time):
+    """Add all components of a sea but the first."""
+    swell = waves.add_wave(swell, sea.second, place, velocity, time)
+    swell = waves.add_wave(swell, sea.third, place, velocity, time)
+    return waves.add_wave(swell, sea.fourth, place, velocity, time)
+
+
+def key_of(generator: np.random.Generator) -> tuple[float, float]:
+    """Return the key of all episodes of a generator's seed: what is drawn from the generator does not change it."""
+    seed: Any = generator.bit_generator.seed_seq
+    child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, _WEATHER))
+    low, high = child.generate_state(2).tolist()
+    return float(low), float(high)
+
+
+def weather_at(conditions: NDArray[np.float64], lanes: int, count: int) -> dict[str, NDArray[np.float64]]:
+    """Return what moves around rows [0, count): `wind` (n, 3) and `water` (n, 3) in m/s, `elevation` (n,) in m."""
+    blocks = conditions.reshape(len(conditions), CONDITIONS, lanes)[:, AT.fluid : AT.fluid + size_of(Fluid)]
+    fluid = blocks.transpose(0, 2, 1).reshape(-1, size_of(Fluid))[:count]
+    at = offsets_of(Fluid)
+    return {
+        "wind": fluid[:, at.air_x : at.air_x + 3],
+        "water": fluid[:, at.water_x : at.water_x + 3],
+        "elevation": fluid[:, at.elevation],
+    }
+
+
+def conditions_of(conditions: NDArray[np.float64], lanes: int, row: int) -> Conditions:
+    """Return the conditions of a row."""
+    block = conditions[row // lanes].reshape(CONDITIONS, lanes)[:, row % lanes]
+    return unpacked(Conditions, block)
+
+
+def give_streams(
+    conditions: NDArray[np.float64], lanes: int, rows: NDArray[np.int64], keys: NDArray[np.float64]
+) -> None:
+    """Let the episodes of rows (k,) come from keys (k, 2), from the first one on."""
+    blocks = conditions.reshape(len(conditions), CONDITIONS, lanes)
+    blocks[rows // lanes, AT.stream : AT.stream + 2, rows % lanes] = keys
+    blocks[rows // lanes, AT.stream + 2, rows % lanes] = 0.0
+
+
+@kernel
+def begin_conditions(conditions, lanes, rows, order, climates, which):
+    """Draw the conditions of episodes that begin.
+
+    Args:
+        conditions: (blocks, CONDITIONS * lanes), updated.
+        lanes: rows a block.
+        rows: (n,) dtype `ROW`, placed already.
+        order: (k,) which rows, int64.
+        climates: (m, CLIMATE) packed `Climate`s.
+        which: (k,) which of them each flies in, int64.
+    """
+    for k in range(order.size):
+        n = order[k]
+        climate = gather(climates[which[k]], 0, 0, 1, Climate)
+        _begin(pointer(conditions[n // lanes]), n % lanes, lanes, rows[n], climate)
+
+
+@inlined
+def sample(memory, i, lanes, b, irregular):
+    """Move lane i's weather on by a tick, and look at it where the vehicle will be in the middle of it."""
+    s = gather(b, FLOWN_AT.state, i, lanes, State)
+    ticks = gather(b, TICKS, i, lanes, float)
+    half, time = 0.5 * TICK, (ticks + 0.5) * TICK
+    place = (s.x + half * s.vx, s.y + half * s.vy, s.z + half * s.vz)
+    key, n = gather(memory, AT.key, i, lanes, Key), _TICKS + _A_TICK * ticks
+    n1, n2 = normals(key, n)
+    n3, n4 = normals(key, n + 1.0)
+    n5, n6 = normals(key, n + 2.0)
+    n7, _ = normals(key, n + 3.0)
+    wind, gusts = gather(memory, AT.wind, i, lanes, WindParams), gather(memory, AT.gusts, i, lanes, Gusts)
+    headings = gather(memory, AT.headings, i, lanes, Headings)
+    later = winds.next_gusts(gusts, wind, (n1, n2, n3, n4, n5))
+    scatter(memory, AT.gusts, i, lanes, later)
+    profile = winds.shear_profile(place[2], wind.shear)
+    air = winds.velocity(gusts, wind, headings.wind, profile)
+    next_air = winds.velocity(later, wind, headings.wind, profile)
+    current, eddies = gather(memory, AT.current, i, lanes, CurrentParams), gather(memory, AT.eddies, i, lanes, Eddies)
+    new = currents.next_eddies(eddies, current, (n6, n7))
+    scatter(memory, AT.eddies, i, lanes, new)
+    flow = currents.velocity(eddies, current, headings.current)
+    next_flow = currents.velocity(new, current, headings.current)
+    sea = gather(memory, AT.sea, i, lanes, Sea)
+    swell = waves.add_wave(waves.calm(), sea.first, place, (s.vx, s.vy), time)
+    if irregular:
+        swell = _add_rest(swell, sea, place, (s.vx, s.vy), time)
+    radius = gather(memory, AT.real + _RADIUS, i, lanes, float)
+    near = near_water_factor(place[2] - swell.elevation, radius)
+    scatter(memory, AT.fluid, i, lanes, _fluid(air, next_air, flow, next_flow, swell, near))
+
+
+@inlined
+def _fluid(air, next_air, flow, next_flow, swell, near_water):
+    """Put air, current and waves together: velocities at both ends of a tick (m/s), and a `Swell`."""
+    rate = 1.0 / TICK
+    return Fluid(
+        0.5 * (air[0] + next_air[0]),
+        0.5 * (air[1] + next_air[1]),
+        0.5 * (air[2] + next_air[2]),
+        rate * (next_air[0] - air[0]),
+        rate * (next_air[1] - air[1]),
+        rate * (next_air[2] - air[2]),
+        0.5 * (flow[0] + next_flow[0]) + swell.u,
+        0.5 * (flow[1] + next_flow[1]) + swell.v,
+        swell.w,
+        swell.ax,
+        swell.ay,
+        swell.az,
+        swell.elevation,
+        swell.rate,
+        near_water,
+    )
+
+
+@inlined
+def any_irregular(memory, lanes):
+    """Whether any lane's sea has more than one component."""
+    most = 0.0
+    for i in range(lanes):
+        most = max(most, gather(memory, _SECOND, i, lanes, float))
+    return most > 0.0
