@@ -1,8 +1,8 @@
 """Random numbers that are a function of a key and a count, so that no order of flying can change them.
 
 The weather of an episode is drawn with the key of that episode: number n is the same whoever asks, for one row or many
-side by side, and however a period is cut up. The hash is Chris Wellons' ``lowbias32``, twice for 64 bits of key; normal
-numbers follow by Box and Muller.
+side by side, and however a period is cut up. The hash is Chris Wellons' ``lowbias32``, three times for 64 bits of key and as many
+of numbers; normal numbers follow by Box and Muller.
 """
 
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from hydrone_gym.physics.trigonometry import sincos
 
 _LOW = 0xFFFFFFFF
 _GOLDEN = 0x9E3779B9
+_APART = 0x85EBCA6B  # no small multiple of the former: a derived key and its numbers share no step
 _WHOLE = 4503599627370496.0  # 2**52, see `hydrone_gym.physics.exponentials`
 _WHOLE_BITS = 0x4330000000000000
 
@@ -50,10 +51,11 @@ def _hashed(x):
 
 @inlined
 def _pair(key, n):
-    """Two hashes of number n, below 2**32."""
-    first = _hashed(_whole(key.low) ^ ((_whole(n) * _GOLDEN) & _LOW))
-    second = _hashed((first + _whole(key.high)) & _LOW)
-    return second, _hashed(second ^ _GOLDEN)
+    """Two hashes of number n, below 2**32: no two numbers of a key, nor number n of two keys, have both the same."""
+    count = _whole(n)
+    mixed = _hashed(_whole(key.low) ^ ((count * _GOLDEN) & _LOW))
+    first = _hashed((mixed + _whole(key.high) + count) & _LOW)
+    return first, _hashed(((first ^ _APART) + mixed) & _LOW)
 
 
 @inlined
@@ -74,6 +76,9 @@ def normals(key, n):
 
 @inlined
 def derived(key, n):
-    """Return the key of stream n of a key: of an episode, from that of all episodes of a row."""
+    """Return the key of stream n of a key: of an episode, from that of all episodes of a row.
+
+    It is made of the same bits as `uniforms` of n: a key is for numbers or for keys.
+    """
     first, second = _pair(key, n)
-    return Key(_float(first), _float(second ^ _whole(key.high)))
+    return Key(_float(first), _float(second))

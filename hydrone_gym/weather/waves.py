@@ -12,7 +12,6 @@ cosh k(z + h) / sinh kh = (e^(kz) + q e^(−kz)) / (1 − q).
 """
 
 import math
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ COMPONENTS = 4  # of a sea
 GRAVITY = 9.78  # m/s^2, Table 1
 STEEPEST = 0.142  # height over length at which a wave in deep water breaks (Michell 1893)
 _PEAKEDNESS = 3.3  # γ of JONSWAP
+_PARTS = 256  # that the energy of its spectrum is cut into, to draw from it
 _NEWTON = 8  # steps to the wave number: from deep water, exact to the last digit for k h > 0.3
 
 
@@ -43,14 +43,6 @@ class Component(NamedTuple):
     speed: float  # a ω / (1 - q), m/s
 
 
-class Band(NamedTuple):
-    """Where a component is drawn from: one of the parts of equal energy that a spectrum is cut into."""
-
-    amplitude: float  # m
-    lowest: float  # rad/s
-    highest: float
-
-
 class Sea(NamedTuple):
     """The components of a sea."""
 
@@ -61,12 +53,12 @@ class Sea(NamedTuple):
 
 
 class SeaParams(NamedTuple):
-    """The bands of a sea, and the water's depth."""
+    """What the components of a sea are drawn from."""
 
-    first: Band
-    second: Band
-    third: Band
-    fourth: Band
+    first: float  # amplitude of the first component, m
+    others: float  # amplitude of each other one, m
+    peak: float  # rad/s
+    irregular: float  # 1 or 0
     depth: float  # m
 
 
@@ -95,22 +87,26 @@ def jonswap(omega: NDArray[np.float64], peak: float) -> NDArray[np.float64]:
     return omega**-5.0 * np.exp(-1.25 * (peak / omega) ** 4) * peaked
 
 
+def _quantiles() -> NDArray[np.float64]:
+    """Frequencies over the peak's that cut a JONSWAP spectrum, from 0.5 to 3, into parts of equal energy."""
+    grid = np.linspace(0.5, 3.0, 20001)
+    energy = np.cumsum(jonswap(grid, 1.0))
+    return np.interp(np.linspace(energy[0], energy[-1], _PARTS + 1), energy, grid)
+
+
+_QUANTILES = _quantiles()
+
+
 def sea_params(height: float, period: float, irregular: bool, depth: float) -> SeaParams:
     """Return a sea of a height (m; significant, if irregular) and a (peak) period (s) over a depth (m).
 
-    A regular sea is one component of half the height. An irregular one has four of equal energy, with the four parts of
-    the spectrum between 0.5 and 3 times its peak as their bands: 4 √m₀ is the height.
+    A regular sea is one component of half the height. An irregular one has four of equal energy, each from its quarter
+    of the energy of the spectrum between 0.5 and 3 times its peak: 4 √m₀ is the height in every sea, and the mean
+    spectrum of many is JONSWAP's.
     """
-    omega = 2.0 * math.pi / period
-    none = Band(0.0, omega, omega)
-    if height == 0.0 or not irregular:
-        return SeaParams(Band(0.5 * height, omega, omega), none, none, none, depth)
-    grid = np.linspace(0.5 * omega, 3.0 * omega, 20001)
-    energy = np.cumsum(jonswap(grid, omega))
-    edges = np.interp(np.linspace(0.0, energy[-1], COMPONENTS + 1), energy, grid).tolist()
-    amplitude = height / 4.0 * math.sqrt(2.0 / COMPONENTS)
-    bands = [Band(amplitude, low, high) for low, high in pairwise(edges)]
-    return SeaParams(*bands, depth)
+    even = height / 4.0 * math.sqrt(2.0 / COMPONENTS)
+    amplitudes = (even, even) if irregular else (0.5 * height, 0.0)
+    return SeaParams(*amplitudes, 2.0 * math.pi / period, float(irregular), depth)
 
 
 @inlined
@@ -126,25 +122,33 @@ def _wave_number(omega, depth):
 
 
 @inlined
-def _component(band, depth, direction, key, n):
-    """Draw a component: frequency within its band, any phase."""
-    share, turn = uniforms(key, n)
-    omega = band.lowest + share * (band.highest - band.lowest)
-    k = _wave_number(omega, depth)
-    q = math.exp(-2.0 * k * depth)
-    speed = band.amplitude * omega / (1.0 - q)
-    phase = 2.0 * math.pi * turn
-    return Component(band.amplitude, k, k * direction[0], k * direction[1], omega, phase, q, speed)
+def _frequency(share):
+    """The frequency over the peak's below which lies a share, below 1, of the energy of an irregular sea."""
+    place = share * _PARTS
+    part = int(place)
+    low = _QUANTILES[part]
+    return low + (place - part) * (_QUANTILES[part + 1] - low)
+
+
+@inlined
+def _component(sea, amplitude, quarter, direction, key, n):
+    """Draw a component: frequency within its quarter of the energy, any phase."""
+    share, turn = uniforms(key, n + quarter)
+    omega = sea.peak * (1.0 + sea.irregular * (_frequency((quarter + share) / COMPONENTS) - 1.0))
+    k = _wave_number(omega, sea.depth)
+    q = math.exp(-2.0 * k * sea.depth)
+    speed = amplitude * omega / (1.0 - q)
+    return Component(amplitude, k, k * direction[0], k * direction[1], omega, 2.0 * math.pi * turn, q, speed)
 
 
 @inlined
 def draw_sea(sea, direction, key, n):
     """Draw the waves of an episode, all running to `direction` (cosine, sine), from pairs n to n + 3 of a key."""
     return Sea(
-        _component(sea.first, sea.depth, direction, key, n),
-        _component(sea.second, sea.depth, direction, key, n + 1.0),
-        _component(sea.third, sea.depth, direction, key, n + 2.0),
-        _component(sea.fourth, sea.depth, direction, key, n + 3.0),
+        _component(sea, sea.first, 0.0, direction, key, n),
+        _component(sea, sea.others, 1.0, direction, key, n),
+        _component(sea, sea.others, 2.0, direction, key, n),
+        _component(sea, sea.others, 3.0, direction, key, n),
     )
 
 

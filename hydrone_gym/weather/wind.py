@@ -24,7 +24,7 @@ from hydrone_gym.weather.noise import normals
 REFERENCE_HEIGHT = 6.096  # m, 20 ft
 _FOOT = 0.3048  # m
 ROUGHNESS = 0.15 * _FOOT  # m, MIL-F-8785C category C
-_LEAST_HEIGHT = 1.0  # m: the profile of the specification begins at 3 ft
+_LEAST_HEIGHT = 3.0 * _FOOT  # where the profile of the specification begins
 _LOG_REFERENCE = math.log(REFERENCE_HEIGHT / ROUGHNESS)
 _C1, _C2 = math.sqrt(1.5), (1.0 - math.sqrt(3.0)) / math.sqrt(2.0)
 
