@@ -1,6 +1,8 @@
 """Current: a mean and a Gauss-Markov variation about it, horizontal, the same at every depth.
 
-u̇ = −μ (u − ū) + noise,      stepped exactly:  u⁺ − ū = e^(−μ dt) (u − ū) + σ √(1 − e^(−2 μ dt)) N(0, 1)
+Of each component, with white noise, and stepped exactly:
+
+    u̇ = −μ (u − ū) + noise      u⁺ − ū = e^(−μ dt) (u − ū) + σ √(1 − e^(−2 μ dt)) N(0, 1)
 """
 
 import math

@@ -1,8 +1,8 @@
 """Random numbers that are a function of a key and a count, so that no order of flying can change them.
 
 The weather of an episode is drawn with the key of that episode: number n is the same whoever asks, for one row or many
-side by side, and however a period is cut up. The hash is Chris Wellons' ``lowbias32``, three times for 64 bits of key and as many
-of numbers; normal numbers follow by Box and Muller.
+side by side, and however a period is cut up. The hash is Chris Wellons' ``lowbias32``, three times for
+64 bits of key and as many of numbers; normal numbers follow by Box and Muller.
 """
 
 from typing import NamedTuple

@@ -26,6 +26,7 @@ COMPONENTS = 4  # of a sea
 GRAVITY = 9.78  # m/s^2, Table 1
 STEEPEST = 0.142  # height over length at which a wave in deep water breaks (Michell 1893)
 _PEAKEDNESS = 3.3  # γ of JONSWAP
+_STILL = 300.0  # k times the depth from where on a wave moves nothing
 _PARTS = 256  # that the energy of its spectrum is cut into, to draw from it
 _NEWTON = 8  # steps to the wave number: from deep water, exact to the last digit for k h > 0.3
 
@@ -156,7 +157,8 @@ def draw_sea(sea, direction, key, n):
 def add_wave(swell, wave, place, velocity, time):
     """Add one component at a place (x, y, z in m), seen from a vehicle with a velocity (x, y in m/s), at a time (s)."""
     sine, cosine = sincos(wave.kx * place[0] + wave.ky * place[1] - wave.omega * time + wave.phase)
-    falling = exp(wave.k * (place[2] if place[2] < 0.0 else 0.0))
+    depth = -wave.k * place[2]
+    falling = exp(-min(max(depth, 0.0), _STILL))
     rising = wave.q / falling
     level, upright = wave.speed * (falling + rising), wave.speed * (falling - rising)
     # along x and y, by the unit vector k/|k|

@@ -9,7 +9,9 @@ import pytest
 
 from hydrone_gym import _jit
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym.weather import current as currents, waves, wind as winds
+from hydrone_gym.weather import current as currents
+from hydrone_gym.weather import waves
+from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.current import Eddies
 from hydrone_gym.weather.noise import Key, derived, normals
 from hydrone_gym.weather.wind import Gusts

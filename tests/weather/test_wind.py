@@ -1,10 +1,13 @@
 """Wind against MIL-F-8785C and against exact stochastic calculus, at any time step."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy import signal
 from scipy.linalg import expm
 
+from benchmarks.dryden import blow
 from hydrone_gym._jit import kernel
 from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.noise import Key, normals
@@ -14,24 +17,6 @@ STEPS = [(0.001, 100.0), (0.005, 20.0), (0.010, 12.0), (0.020, 8.0), (0.050, 3.0
 STATIONARY = np.diag([1.0, 1.0, 0.5, 1.0, 0.5])
 STATIONARY[[1, 2, 3, 4], [2, 1, 4, 3]] = 0.5
 DIRECTION = (0.6, -0.8)
-
-
-@kernel
-def blow(wind, direction, every, out):
-    """Velocities (3, streams, samples) of streams that begin as an episode does, a sample every so many steps."""
-    _, streams, samples = out.shape
-    for i in range(streams):
-        key = Key(float(i), 1.0)
-        gusts = winds.first_gusts(key, 0.0)
-        n = 3.0
-        for j in range(samples):
-            out[0, i, j], out[1, i, j], out[2, i, j] = winds.velocity(gusts, wind, direction, 1.0)
-            for _ in range(every):
-                a, b = normals(key, n)
-                c, d = normals(key, n + 1.0)
-                e, _ = normals(key, n + 2.0)
-                gusts = winds.next_gusts(gusts, wind, (a, b, c, d, e))
-                n += 3.0
 
 
 @kernel
@@ -170,7 +155,7 @@ def test_spectrum(blown):
         x = 2.0 * np.pi * frequencies * time
         shape = 2.0 / (1.0 + x**2) if k == 0 else (1.0 + 3.0 * x**2) / (1.0 + x**2) ** 2
         expected = 2.0 * sigma**2 * time * shape
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges):
             band = (frequencies >= low) & (frequencies < high)
             np.testing.assert_allclose(density[k, band].mean(), expected[band].mean(), rtol=0.05)
 
