@@ -157,8 +157,7 @@ def draw_sea(sea, direction, key, n):
 def add_wave(swell, wave, place, velocity, time):
     """Add one component at a place (x, y, z in m), seen from a vehicle with a velocity (x, y in m/s), at a time (s)."""
     sine, cosine = sincos(wave.kx * place[0] + wave.ky * place[1] - wave.omega * time + wave.phase)
-    depth = -wave.k * place[2]
-    falling = exp(-min(max(depth, 0.0), _STILL))
+    falling = exp(-min(max(-wave.k * place[2], 0.0), _STILL))
     rising = wave.q / falling
     level, upright = wave.speed * (falling + rising), wave.speed * (falling - rising)
     # along x and y, by the unit vector k/|k|

@@ -73,7 +73,7 @@ def places(depth, count=40):
 
 
 @pytest.mark.parametrize("depth", [0.1, 0.5, 5.0, 40.0])
-@pytest.mark.parametrize("period", [0.5, 1.0, 2.0, 5.0, 12.0])
+@pytest.mark.parametrize("period", [0.3, 1.0, 2.0, 5.0, 20.0])
 def test_dispersion(depth, period):
     omega = 2.0 * np.pi / period
     k = wave_number(omega, depth)
@@ -217,3 +217,13 @@ def test_phases_are_any(seas):
     np.testing.assert_array_less(phases, 2.0 * np.pi)
     assert abs(np.exp(1j * phases).mean(1)).max() < 4.5 / np.sqrt(SEAS)
     assert abs(np.corrcoef(np.concatenate([omegas, phases])) - np.eye(2 * COMPONENTS)).max() < 4.5 / np.sqrt(SEAS)
+
+
+@pytest.mark.parametrize("period", [0.3, 20.0])
+def test_shortest_and_longest(period):
+    """Short waves leave the deep still; long ones take all the water along."""
+    sea = drawn(sea_params(0.01, period, True, DEPTH), DIRECTION, KEY, 0.0)
+    for z in (0.0, -0.5, -2.0, -DEPTH, -2.0 * DEPTH):
+        water = water_at(sea, 1.0, 2.0, z, 3.0)
+        assert np.isfinite(water).all()
+        assert (np.abs(water).max() < 1e-9) == (period == 0.3 and z < 0.0)
