@@ -87,13 +87,15 @@ class EpisodeBatch:
         self.observation_space = raw if self.egocentric is None else egocentric_space()
         self.low, self.high = references.low.astype(np.float64), references.high.astype(np.float64)
         if options.weathered:
-            self._expose()
+            self._expose(options.weather)
         self._bind()
 
-    def _expose(self) -> None:
-        """Make room for weather, and for vehicles as they are."""
-        self.conditions = np.zeros((-(-self.count // self.lanes), CONDITIONS * self.lanes))
-        self.simulations = [simulation.twin(weathered=True) for simulation in self.simulations]
+    def _expose(self, weather: Weather) -> None:
+        """Make room for weather such as this one, and for vehicles as they are."""
+        extra = None if weather.extra is None else type(weather.extra)
+        if not self.weathered:
+            self.conditions = np.zeros((-(-self.count // self.lanes), CONDITIONS * self.lanes))
+        self.simulations = [simulation.flown_in(True, extra) for simulation in self.simulations]
 
     def _bind(self) -> None:
         """Make what shares memory with the episodes or is read-only, and the threads."""
@@ -275,9 +277,13 @@ class EpisodeBatch:
         """
         begin_rows(self.episodes, missions, rows, self._flown[0][1])
         carried = {k: each.weather for k, each in enumerate(scenarios) if each is not None and each.weather is not None}
-        if carried and not self.weathered:
-            self._expose()
-            self._bind()
+        for weather in carried.values():
+            known = self.simulations[0].extra
+            if not self.weathered or (weather.extra is not None and known is None):
+                self._expose(weather)
+                self._bind()
+            elif weather.extra is not None and type(weather.extra) is not known:
+                raise ValueError(f"a scenario's disturbance must be a {known.__name__} here, got {weather.extra!r}")
         if self.weathered:
             self._begin_conditions(rows, carried)
         for row in rows.tolist():
@@ -309,13 +315,13 @@ class EpisodeBatch:
     def restore_conditions(self, kept: NDArray[np.float64]) -> None:
         """Go back to the conditions of a snapshot; without any, weather is as it was when the row's stream began."""
         if kept.size and not self.weathered:
-            self._expose()
+            self._expose(self.options.weather)
             self._bind()
         self.reseeded[:] = not kept.size
         if kept.size:
             self.conditions[...] = kept
         elif self.weathered:
-            self.conditions, self.simulations = STILL, [each.twin(weathered=False) for each in self.simulations]
+            self.conditions, self.simulations = STILL, [each.flown_in(False) for each in self.simulations]
             self._bind()
 
     def _climate(self, weather: Weather) -> int:

@@ -127,6 +127,15 @@ def between(air, water, share):
 
 
 @inlined
+def shares_of(share, real):
+    """Return the water's shares of the mass with added mass, and of the density, of a hull with a submerged share."""
+    dry, heavy, dense = 1.0 - share, share * real.mass_water, share * WATER_DENSITY
+    mass, density = dry * real.mass_air + heavy, dry * AIR_DENSITY + dense
+    inverse = 1.0 / (mass * density)  # divisions take most of a physics step: one for both
+    return 1.0 if share == 1.0 else heavy * (density * inverse), dense * (mass * inverse)
+
+
+@inlined
 def blended(vehicle, driven, share, mass_share):
     """Return the `MediumParams` of a partly submerged hull; rotors are those of the medium they are driven for."""
     air, water = vehicle.air, vehicle.water
@@ -249,10 +258,7 @@ def immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after, 
     )
     height = state.z - (fluid.elevation + after * fluid.elevation_rate)
     share = submerged_share(height, real.inverse_height)
-    heavy = share * real.mass_water
-    mass_share = heavy / ((1.0 - share) * real.mass_air + heavy)
-    dense = share * WATER_DENSITY
-    dense = dense / ((1.0 - share) * AIR_DENSITY + dense)
+    mass_share, dense = shares_of(share, real)
     medium = blended(vehicle, driven, share, mass_share)
     thrusts, turning = _rotors(attitude, speeds, height, share, vehicle, real, fluid, driven)
     fx, fy, fz = _water_force(state, fluid, water, share, real)

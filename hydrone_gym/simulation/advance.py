@@ -24,7 +24,7 @@ from hydrone_gym.physics.rotors import shaft_power
 from hydrone_gym.physics.trigonometry import wrap
 from hydrone_gym.simulation.clock import DT, SUBSTEPS, TICK
 from hydrone_gym.simulation.conditions import AT as CONDITIONS_AT
-from hydrone_gym.simulation.conditions import Noticed, any_irregular, sample
+from hydrone_gym.simulation.conditions import Noticed, any_rare, sample
 from hydrone_gym.simulation.outcome import COLLISION, DIVERGED, GOAL, OUT_OF_BOUNDS, ROUGH_TRANSITION, RUNNING
 from hydrone_gym.simulation.storage import (
     AT,
@@ -253,7 +253,7 @@ def log_crossings(b, lanes):
 
 
 @inlined
-def advance(b, lanes, obstacles, closest, count, model, part, weather):
+def advance(b, lanes, obstacles, closest, count, model, part, weather, extra):
     """Advance all lanes through a part of a period.
 
     Args:
@@ -265,6 +265,7 @@ def advance(b, lanes, obstacles, closest, count, model, part, weather):
         model: `Model`.
         part: (first, last, ticks): ticks [first, last) of a period of `ticks` ticks.
         weather: the lanes' `Conditions`, or None for the nominal vehicle in still air and flat water.
+        extra: the class of a disturbance in that weather, or None.
     """
     first, last, ticks = part
     inverses = (1.0 / (ticks * SUBSTEPS), 1.0 / (ticks * TICK))
@@ -274,9 +275,9 @@ def advance(b, lanes, obstacles, closest, count, model, part, weather):
         for i in range(width):
             begin_tick(b, i, lanes)
         if weather is not None:
-            irregular = any_irregular(weather, lanes)
+            rare = any_rare(weather, lanes)
             for i in range(width):
-                sample(weather, i, lanes, b, irregular)
+                sample(weather, i, lanes, b, rare, extra)
         for sub in range(SUBSTEPS):
             part = (tick * SUBSTEPS + sub + 1, sub + 1)
             for i in range(lanes):
@@ -292,20 +293,22 @@ def advance(b, lanes, obstacles, closest, count, model, part, weather):
 
 
 @functools.cache
-def compiled(law: str, lanes: int, weathered: bool = False) -> Any:
+def compiled(law: str, lanes: int, weathered: bool = False, extra: type | None = None) -> Any:
     """Return `advance` compiled for a law and a number of lanes, with weather or without.
 
     Its `address` is what kernels call, ``call(address, block, obstacles, closest, weather, values, count, first, last,
-    ticks)``; without weather that pointer is never read.
+    ticks)``; without weather that pointer is never read. `extra` is the class of a disturbance.
     """
     gains = named_law(law).gains
 
     def unit_of_law(block, obstacles, closest, weather, values, count, first, last, ticks):
-        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks), None)
+        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks), None, None)
 
     def unit_with_weather(block, obstacles, closest, weather, values, count, first, last, ticks):
-        advance(block, lanes, obstacles, closest, count, model_of(values, gains), (first, last, ticks), weather)
+        model, part = model_of(values, gains), (first, last, ticks)
+        advance(block, lanes, obstacles, closest, count, model, part, weather, extra)
 
     numbers, whole = types.CPointer(types.float64), types.int64
     signature = types.void(numbers, numbers, numbers, numbers, numbers, whole, whole, whole, whole)
-    return unit(signature, unit_with_weather if weathered else unit_of_law, __name__, gains.__module__)
+    modules = {__name__, gains.__module__, __name__ if extra is None else extra.__module__}
+    return unit(signature, unit_with_weather if weathered else unit_of_law, *sorted(modules))

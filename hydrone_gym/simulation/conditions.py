@@ -11,25 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym._memory import gather, offsets_of, packed, pointer, scatter, size_of, unpacked
+from hydrone_gym._memory import gather, offsets_of, packed, pointer, scatter, select, size_of, unpacked
 from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, near_water_factor, unmodelled_of
 from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.parameters import Hull, VehicleParams, hull_of, params_of
 from hydrone_gym.simulation.clock import DT, TICK
-from hydrone_gym.simulation.storage import FLOWN_AT, TICKS
+from hydrone_gym.simulation.outcome import RUNNING
+from hydrone_gym.simulation.storage import FLOWN_AT, OUTCOME, TICKS
 from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.weather import current as currents
 from hydrone_gym.weather import waves
 from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.current import CurrentParams, Eddies
-from hydrone_gym.weather.noise import Key, derived, normals, uniforms
+from hydrone_gym.weather.disturbance import MOST, flow_of
+from hydrone_gym.weather.noise import Key, derived, kicks, uniforms
 from hydrone_gym.weather.waves import Sea, SeaParams
 from hydrone_gym.weather.weather import Spread, Weather
 from hydrone_gym.weather.wind import Gusts, WindParams
 
 # Which pairs of an episode's key are for what.
-_DIRECTIONS, _VEHICLE, _GUSTS, _EDDIES, _WAVES, _TICKS = 0.0, 2.0, 10.0, 13.0, 14.0, 64.0
+_DIRECTIONS, _VEHICLE, _GUSTS, _EDDIES, _WAVES, _CHANCES, _TICKS = 0.0, 2.0, 10.0, 13.0, 14.0, 20.0, 64.0
 _A_TICK = 4.0  # pairs that a tick takes
 _WEATHER = 1  # the child of a seed that is for weather
 
@@ -64,6 +66,15 @@ class Stream(NamedTuple):
     episodes: float  # begun so far
 
 
+class Chances(NamedTuple):
+    """What a disturbance draws an episode with: even between 0 and 1."""
+
+    chance_0: float
+    chance_1: float
+    chance_2: float
+    chance_3: float
+
+
 class Conditions(NamedTuple):
     """The conditions of one lane."""
 
@@ -80,6 +91,7 @@ class Conditions(NamedTuple):
     headings: Headings
     sea: Sea
     stream: Stream
+    chances: Chances  # a disturbance's numbers come after
 
 
 class SpreadParams(NamedTuple):
@@ -113,9 +125,11 @@ class Climate(NamedTuple):
 
 
 AT = offsets_of(Conditions)
-CONDITIONS = size_of(Conditions)
-CLIMATE = size_of(Climate)
+_EXTRA = size_of(Conditions)  # a disturbance's numbers
+CONDITIONS = _EXTRA + MOST
+_EXTRA_OF_CLIMATE = size_of(Climate)
 _RADIUS = offsets_of(Unmodelled).near_water_radius
+_SHEAR = offsets_of(WindParams).shear
 _SECOND = AT.sea + offsets_of(Sea).second  # amplitude of a sea's second component
 
 
@@ -125,7 +139,7 @@ def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float)
     given = spread.rotor_lag_air, spread.rotor_lag_water, spread.rotor_drag, spread.height
     ranges = [end for value, pair in zip(own, given, strict=True) for end in (pair or (value, value))]
     directions = weather.wind_direction, weather.current_direction, weather.wave_direction
-    return packed(
+    numbers = packed(
         Climate(
             hull_of(vehicle),
             SpreadParams(spread.mass, spread.thrust, spread.inertia, spread.drag, *ranges),
@@ -135,6 +149,9 @@ def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float)
             *(math.nan if direction is None else direction for direction in directions),
         )
     )
+    extra = np.zeros(MOST)
+    extra[: len(weather.extra or ())] = weather.extra or ()
+    return np.concatenate([numbers, extra])
 
 
 @inlined
@@ -206,9 +223,11 @@ def _hull_of_episode(hull, spread, key):
 
 
 @inlined
-def _begin(memory, i, lanes, row, climate):
+def _begin(memory, i, lanes, row, numbers):
     """Draw the conditions of the episode that lane i begins."""
-    stream = gather(memory, AT.stream, i, lanes, Stream)
+    climate, stream = gather(numbers, 0, 0, 1, Climate), gather(memory, AT.stream, i, lanes, Stream)
+    for k in range(MOST):
+        memory[(_EXTRA + k) * lanes + i] = numbers[_EXTRA_OF_CLIMATE + k]
     key = derived(stream.key, stream.episodes)
     scatter(memory, AT.stream, i, lanes, Stream(stream.key, stream.episodes + 1.0))
     scatter(memory, AT.key, i, lanes, key)
@@ -218,6 +237,7 @@ def _begin(memory, i, lanes, row, climate):
     scatter(memory, AT.real, i, lanes, unmodelled_of(hull, DT))
     to_wind, to_current = uniforms(key, _DIRECTIONS)
     to_waves, _ = uniforms(key, _DIRECTIONS + 1.0)
+    scatter(memory, AT.chances, i, lanes, Chances(*uniforms(key, _CHANCES), *uniforms(key, _CHANCES + 1.0)))
     headings = Headings(
         _heading(climate.wind_direction, to_wind),
         _heading(climate.current_direction, to_current),
@@ -297,46 +317,61 @@ def begin_conditions(conditions, lanes, rows, order, climates, which):
         lanes: rows a block.
         rows: (n,) dtype `ROW`, placed already.
         order: (k,) which rows, int64.
-        climates: (m, CLIMATE) packed `Climate`s.
+        climates: (m, numbers) from `climate_of`.
         which: (k,) which of them each flies in, int64.
     """
     for k in range(order.size):
         n = order[k]
-        climate = gather(climates[which[k]], 0, 0, 1, Climate)
-        _begin(pointer(conditions[n // lanes]), n % lanes, lanes, rows[n], climate)
+        _begin(pointer(conditions[n // lanes]), n % lanes, lanes, rows[n], climates[which[k]])
 
 
 @inlined
-def sample(memory, i, lanes, b, irregular):
-    """Move lane i's weather on by a tick, and look at it where the vehicle will be in the middle of it."""
+def sample(memory, i, lanes, b, rare, extra):
+    """Move lane i's weather on by a tick, and look at it where the vehicle will be in the middle of it.
+
+    `rare` says whether any lane has what `any_rare` looks for; `extra` is the class of a disturbance, or None.
+    """
     s = gather(b, FLOWN_AT.state, i, lanes, State)
     ticks = gather(b, TICKS, i, lanes, float)
     half, time = 0.5 * TICK, (ticks + 0.5) * TICK
     place = (s.x + half * s.vx, s.y + half * s.vy, s.z + half * s.vz)
     key, n = gather(memory, AT.key, i, lanes, Key), _TICKS + _A_TICK * ticks
-    n1, n2 = normals(key, n)
-    n3, n4 = normals(key, n + 1.0)
-    n5, n6 = normals(key, n + 2.0)
-    n7, _ = normals(key, n + 3.0)
+    n1, n2 = kicks(key, n)
+    n3, n4 = kicks(key, n + 1.0)
+    n5, n6 = kicks(key, n + 2.0)
+    n7, _ = kicks(key, n + 3.0)
     wind, gusts = gather(memory, AT.wind, i, lanes, WindParams), gather(memory, AT.gusts, i, lanes, Gusts)
     headings = gather(memory, AT.headings, i, lanes, Headings)
     later = winds.next_gusts(gusts, wind, (n1, n2, n3, n4, n5))
-    scatter(memory, AT.gusts, i, lanes, later)
-    profile = winds.shear_profile(place[2], wind.shear)
+    profile = winds.shear_profile(place[2], wind.shear) if rare else 1.0
     air = winds.velocity(gusts, wind, headings.wind, profile)
     next_air = winds.velocity(later, wind, headings.wind, profile)
     current, eddies = gather(memory, AT.current, i, lanes, CurrentParams), gather(memory, AT.eddies, i, lanes, Eddies)
     new = currents.next_eddies(eddies, current, (n6, n7))
-    scatter(memory, AT.eddies, i, lanes, new)
     flow = currents.velocity(eddies, current, headings.current)
     next_flow = currents.velocity(new, current, headings.current)
     sea = gather(memory, AT.sea, i, lanes, Sea)
     swell = waves.add_wave(waves.calm(), sea.first, place, (s.vx, s.vy), time)
-    if irregular:
+    near = 1.0
+    if rare:
         swell = _add_rest(swell, sea, place, (s.vx, s.vy), time)
-    radius = gather(memory, AT.real + _RADIUS, i, lanes, float)
-    near = near_water_factor(place[2] - swell.elevation, radius)
-    scatter(memory, AT.fluid, i, lanes, _fluid(air, next_air, flow, next_flow, swell, near))
+        near = near_water_factor(place[2] - swell.elevation, gather(memory, AT.real + _RADIUS, i, lanes, float))
+    if extra is not None:
+        chances, numbers = gather(memory, AT.chances, i, lanes, Chances), gather(memory, _EXTRA, i, lanes, extra)
+        more_air, more_water = flow_of(numbers, chances, place, time)
+        air, next_air = _sum(air, more_air), _sum(next_air, more_air)
+        swell = waves.carried(swell, more_water)
+    # where a flight has ended its time stands still, and so does its weather
+    running = gather(b, OUTCOME, i, lanes, float) == RUNNING
+    fluid = gather(memory, AT.fluid, i, lanes, Fluid)
+    scatter(memory, AT.gusts, i, lanes, select(running, later, gusts))
+    scatter(memory, AT.eddies, i, lanes, select(running, new, eddies))
+    scatter(memory, AT.fluid, i, lanes, select(running, _fluid(air, next_air, flow, next_flow, swell, near), fluid))
+
+
+@inlined
+def _sum(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @inlined
@@ -363,9 +398,11 @@ def _fluid(air, next_air, flow, next_flow, swell, near_water):
 
 
 @inlined
-def any_irregular(memory, lanes):
-    """Whether any lane's sea has more than one component."""
+def any_rare(memory, lanes):
+    """Whether any lane has what most weather has not, and what costs: an irregular sea, shear, a near-water effect."""
     most = 0.0
     for i in range(lanes):
+        shear = gather(memory, AT.wind + _SHEAR, i, lanes, float)
+        most = max(most, shear + gather(memory, AT.real + _RADIUS, i, lanes, float))
         most = max(most, gather(memory, _SECOND, i, lanes, float))
     return most > 0.0

@@ -35,6 +35,7 @@ class Simulation:
         law: name of the control law that flies it.
         weathered: whether rows have `Conditions`, their weather and the vehicle as it is; without, `vehicle` flies as
             its controller believes it to be, in still air and flat water.
+        extra: the class of a disturbance in that weather, see `hydrone_gym.weather.disturbance`.
 
     Raises:
         ValueError: a period that is no multiple of the tick, an unknown law.
@@ -48,6 +49,7 @@ class Simulation:
         lanes: int = 1,
         law: str = "paper",
         weathered: bool = False,
+        extra: type | None = None,
     ) -> None:
         """Pack the model."""
         self.vehicle = vehicle
@@ -56,7 +58,7 @@ class Simulation:
         self.ticks = ticks_in(period)
         self.lanes = lanes
         self.law = law
-        self.weathered = weathered
+        self.weathered, self.extra = weathered, extra
         self.values = pack_model(vehicle, world, named_law(law))
         self._engine: Engine | None = None
 
@@ -64,14 +66,17 @@ class Simulation:
     def engine(self) -> Engine:
         """What kernels advance blocks with; compiled, or loaded, when it is first asked for."""
         if self._engine is None:
-            address = compiled(self.law, self.lanes, self.weathered).address
+            address = compiled(self.law, self.lanes, self.weathered, self.extra).address
             self._engine = Engine(address, self.lanes, self.ticks, self.values, new_block(self.lanes))
         return self._engine
 
-    def twin(self, weathered: bool | None = None) -> Self:
-        """Return another simulation of the same model, with storage of its own; `weathered` as before unless given."""
-        outdoors = self.weathered if weathered is None else weathered
-        return type(self)(self.vehicle, self.world, self.period, self.lanes, self.law, outdoors)
+    def twin(self) -> Self:
+        """Return another simulation of the same model, with storage of its own."""
+        return self.flown_in(self.weathered, self.extra)
+
+    def flown_in(self, weathered: bool, extra: type | None = None) -> Self:
+        """Return a simulation of the same vehicle and world with weather, or without."""
+        return type(self)(self.vehicle, self.world, self.period, self.lanes, self.law, weathered, extra)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what holds for this process only: the kernel's address."""

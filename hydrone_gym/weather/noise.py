@@ -5,6 +5,7 @@ side by side, and however a period is cut up. The hash is Chris Wellons' ``lowbi
 64 bits of key and as many of numbers; normal numbers follow by Box and Muller.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ _GOLDEN = 0x9E3779B9
 _APART = 0x85EBCA6B  # no small multiple of the former: a derived key and its numbers share no step
 _WHOLE = 4503599627370496.0  # 2**52, see `hydrone_gym.physics.exponentials`
 _WHOLE_BITS = 0x4330000000000000
+_PER_BYTE = math.sqrt(3.0 / (256.0**2 - 1.0))  # four numbers even in 0 … 255 have the variance (256² − 1) / 3
 
 
 class Key(NamedTuple):
@@ -72,6 +74,24 @@ def normals(key, n):
     length = np.sqrt(-2.0 * log(first))
     sine, cosine = sincos(6.283185307179586 * second)
     return length * cosine, length * sine
+
+
+@inlined
+def _sum_of_bytes(n):
+    """The sum of the four bytes of a whole number below 2**32."""
+    pairs = (n & 0x00FF00FF) + ((n >> 8) & 0x00FF00FF)
+    return (pairs & 0xFFFF) + (pairs >> 16)
+
+
+@inlined
+def kicks(key, n):
+    """Return pair n of independent numbers of zero mean and unit variance, to drive filters with.
+
+    Each is the sum of four even ones. A filter's variance, autocorrelation and spectrum are those that normal numbers
+    give, and so is, nearly, its distribution; the square root, logarithm and division they would take are saved.
+    """
+    first, second = _pair(key, n)
+    return (_float(_sum_of_bytes(first)) - 510.0) * _PER_BYTE, (_float(_sum_of_bytes(second)) - 510.0) * _PER_BYTE
 
 
 @inlined

@@ -175,6 +175,21 @@ def add_wave(swell, wave, place, velocity, time):
 
 
 @inlined
+def carried(swell, velocity):
+    """Let the water also move with a velocity (x, y, z in m/s)."""
+    return Swell(
+        swell.elevation,
+        swell.rate,
+        swell.u + velocity[0],
+        swell.v + velocity[1],
+        swell.w + velocity[2],
+        swell.ax,
+        swell.ay,
+        swell.az,
+    )
+
+
+@inlined
 def calm():
     """Return a `Swell` without waves."""
     return Swell(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

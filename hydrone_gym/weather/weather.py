@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from hydrone_gym.weather.disturbance import check
 from hydrone_gym.weather.waves import STEEPEST, wave_number
 
 DEPTH = 5.0  # m, of the default world's water: what the steepness of a wave is judged by
@@ -101,6 +102,7 @@ class Weather:
     wave_period: float = 2.0  #: s; of an irregular sea that of its peak
     wave_direction: float | None = None  #: where the waves run to, rad
     sea: str = "regular"  #: "regular" for one wave, "jonswap" for a few components drawn from that spectrum
+    extra: Any = None  #: what else moves air and water: a disturbance, see `hydrone_gym.weather.disturbance`
     spread: Spread = Spread()  #: how far the vehicle may be from the nominal one
     name: str = "custom"  #: what to call it in tables
 
@@ -122,6 +124,8 @@ class Weather:
             raise ValueError(f"Weather.sea must be one of {', '.join(map(repr, SEAS))}, got {self.sea!r}")
         if not isinstance(self.spread, Spread):
             raise ValueError(f"Weather.spread must be a Spread, got {self.spread!r}")
+        if self.extra is not None:
+            check(self.extra)
         if not isinstance(self.name, str):
             raise ValueError(f"Weather.name must be a string, got {self.name!r}")
         k = wave_number(2.0 * math.pi / self.wave_period, DEPTH)
@@ -136,7 +140,7 @@ class Weather:
     def still(self) -> bool:
         """Whether nothing moves and the vehicle is the nominal one."""
         flat = self.wind == 0.0 and self.current == 0.0 and self.wave_height == 0.0
-        return flat and self.spread == Spread()
+        return flat and self.extra is None and self.spread == Spread()
 
 
 def _level(level: int, wind: float, current: float, height: float, period: float, error: float) -> Weather:

@@ -119,11 +119,14 @@ def validate(scenario: Scenario, world: World, vehicle_radius: float) -> None:
 def save_scenario(scenario: Scenario, path: str | Path) -> None:
     """Write a scenario to a JSON file; every float is restored bit for bit by `load_scenario`.
 
-    Raises ValueError naming the path for a number that is not finite, and OSError when the file cannot be written.
+    Raises ValueError naming the path for a number that is not finite or a disturbance in its weather, and OSError when
+    the file cannot be written.
     """
     content = {"format": FORMAT, "version": VERSION, **vars(scenario), "obstacles": scenario.obstacles.tolist()}
     del content["weather"]
     if scenario.weather is not None:
+        if scenario.weather.extra is not None:
+            raise ValueError(f"{path}: a scenario file cannot hold the disturbance {scenario.weather.extra!r}")
         content["weather"] = asdict(scenario.weather)
     try:
         text = json.dumps(content, indent=1, allow_nan=False)
