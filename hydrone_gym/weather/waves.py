@@ -36,8 +36,8 @@ class Component(NamedTuple):
 
     amplitude: float  # a, m
     k: float  # 1/m
-    kx: float
-    ky: float
+    x: float  # the way it runs, a unit vector
+    y: float
     omega: float  # rad/s
     phase: float  # ε, rad
     q: float  # e^(-2 k h)
@@ -139,7 +139,7 @@ def _component(sea, amplitude, quarter, direction, key, n):
     k = _wave_number(omega, sea.depth)
     q = math.exp(-2.0 * k * sea.depth)
     speed = amplitude * omega / (1.0 - q)
-    return Component(amplitude, k, k * direction[0], k * direction[1], omega, 2.0 * math.pi * turn, q, speed)
+    return Component(amplitude, k, direction[0], direction[1], omega, 2.0 * math.pi * turn, q, speed)
 
 
 @inlined
@@ -156,20 +156,20 @@ def draw_sea(sea, direction, key, n):
 @inlined
 def add_wave(swell, wave, place, velocity, time):
     """Add one component at a place (x, y, z in m), seen from a vehicle with a velocity (x, y in m/s), at a time (s)."""
-    sine, cosine = sincos(wave.kx * place[0] + wave.ky * place[1] - wave.omega * time + wave.phase)
+    along, speed = wave.x * place[0] + wave.y * place[1], wave.x * velocity[0] + wave.y * velocity[1]
+    sine, cosine = sincos(wave.k * along - wave.omega * time + wave.phase)
     falling = exp(-min(max(-wave.k * place[2], 0.0), _STILL))
     rising = wave.q / falling
     level, upright = wave.speed * (falling + rising), wave.speed * (falling - rising)
-    # along x and y, by the unit vector k/|k|
-    x, y = wave.kx / wave.k, wave.ky / wave.k
+    u, a = level * cosine, level * wave.omega * sine
     return Swell(
         swell.elevation + wave.amplitude * cosine,
-        swell.rate + wave.amplitude * sine * (wave.omega - wave.kx * velocity[0] - wave.ky * velocity[1]),
-        swell.u + level * cosine * x,
-        swell.v + level * cosine * y,
+        swell.rate + wave.amplitude * sine * (wave.omega - wave.k * speed),
+        swell.u + u * wave.x,
+        swell.v + u * wave.y,
         swell.w + upright * sine,
-        swell.ax + level * wave.omega * sine * x,
-        swell.ay + level * wave.omega * sine * y,
+        swell.ax + a * wave.x,
+        swell.ay + a * wave.y,
         swell.az - upright * wave.omega * cosine,
     )
 
