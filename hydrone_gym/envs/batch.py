@@ -14,24 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.envs.info import crossings_of
 from hydrone_gym.envs.options import Options
+from hydrone_gym.envs.outdoors import Outdoors
 from hydrone_gym.envs.requests import REFERENCE, checked
 from hydrone_gym.envs.spaces import action_space, egocentric_space, observation_space, relative_action_space
 from hydrone_gym.envs.task import OUTCOME, REPORT, Missions, begin_rows, new_episodes, pack_task, settle
 from hydrone_gym.perception.egocentric import LEAST, OBSERVATION_SIZE, Egocentric, new_memory
 from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.rendering.view import new_screen
-from hydrone_gym.simulation.conditions import (
-    CONDITIONS,
-    begin_conditions,
-    climate_of,
-    give_streams,
-    key_of,
-    weather_at,
-)
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import STILL, Simulation
 from hydrone_gym.vehicle import named_vehicle
-from hydrone_gym.weather import Weather
 from hydrone_gym.world.bodies import NOWHERE
 from hydrone_gym.world.generator import draw, first_numbers, place_many, prepare
 from hydrone_gym.world.scenario import Scenario
@@ -51,7 +43,7 @@ class Flown(NamedTuple):
     observation: Any  # as of now: a dict of arrays, or one array with interface="egocentric"
     last_observations: np.ndarray  # (n,) object: an observation where an episode ended and the next has begun at once
     last_transitions: np.ndarray  # (n,) object: its crossings
-    weather: dict[str, NDArray[np.float64]]  # around the rows, of the period flown; see `EpisodeBatch.weather`
+    weather: dict[str, NDArray[np.float64]]  # around the rows, of the period flown; see `Outdoors.weather`
 
 
 class EpisodeBatch:
@@ -74,9 +66,7 @@ class EpisodeBatch:
         self.transitions = np.full(count, None, dtype=object)
         self.ended, self.starting = np.ones(count, bool), np.zeros(count, bool)
         self.generators: list[np.random.Generator] = []
-        self.conditions: NDArray[np.float64] = STILL
-        self._climates: dict[Weather, tuple[int, NDArray[np.float64]]] = {}
-        self.reseeded = np.ones(count, bool)  # whose stream of weather is still to come from its generator
+        self.outdoors = Outdoors(options, count, lanes)
         self.reference_filter: ReferenceFilter | None = None
         self.screen = new_screen(options.render_mode, options.render_size, options.camera, simulation, render_modes)
         self.egocentric = Egocentric(simulation) if options.interface == "egocentric" else None
@@ -86,19 +76,13 @@ class EpisodeBatch:
         self.action_space = references if self.egocentric is None else relative_action_space()
         self.observation_space = raw if self.egocentric is None else egocentric_space()
         self.low, self.high = references.low.astype(np.float64), references.high.astype(np.float64)
-        if options.weathered:
-            self._expose(options.weather)
         self._bind()
-
-    def _expose(self, weather: Weather) -> None:
-        """Make room for weather such as this one, and for vehicles as they are."""
-        extra = None if weather.extra is None else type(weather.extra)
-        if not self.weathered:
-            self.conditions = np.zeros((-(-self.count // self.lanes), CONDITIONS * self.lanes))
-        self.simulations = [simulation.flown_in(True, extra) for simulation in self.simulations]
 
     def _bind(self) -> None:
         """Make what shares memory with the episodes or is read-only, and the threads."""
+        flown = self.outdoors.weathered, self.outdoors.extra
+        if (self.simulations[0].weathered, self.simulations[0].extra) != flown:
+            self.simulations = [simulation.flown_in(*flown) for simulation in self.simulations]
         now, lanes, threads, model = self.episodes, self.lanes, len(self.simulations), self.simulations[0]
         self._prepared = prepare(self.draws, model.world, model.vehicle.radius)
         self.perceived = perceive(now.rows, now.known, now.found)
@@ -112,7 +96,7 @@ class EpisodeBatch:
         for part in self._parts:
             own = slice(part.start // lanes, -(-part.stop // lanes))
             task = pack_task(model, self.options.time_limit, part)
-            around = self.conditions[own] if self.weathered else STILL
+            around = self.outdoors.conditions[own] if self.outdoors.weathered else STILL
             self._flown.append((part, task, now.rows[part], now.obstacles[own], now.closest[own], around))
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
@@ -123,11 +107,6 @@ class EpisodeBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._bind()
-
-    @property
-    def weathered(self) -> bool:
-        """Whether rows have `Conditions`."""
-        return self.conditions.size > 0
 
     def observation_of(self, row: int) -> Any:
         """Return a new observation of a row."""
@@ -197,11 +176,11 @@ class EpisodeBatch:
         if self._pool is None and not same_step:  # nothing to share out: copies in one go
             self._fly_part(0, references, None)
             now = self.episodes.report.T.copy()
-            return Flown(now, now, self.observation(), *_NOTHING, {})
+            return Flown(now, now, self.observation(), _NOTHING[0], _NOTHING[1], {})
         report, now = (np.empty((len(REPORT), self.count)) for _ in range(2))
         lasts = np.full((2, self.count), None, dtype=object) if same_step else _NOTHING
-        weather = {name: np.empty_like(values) for name, values in self.weather().items()} if same_step else {}
-        flown = Flown(report if same_step else now, now, self.new_observation(), *lasts, weather)
+        weather = {name: np.empty_like(values) for name, values in self.outdoors.weather().items()} if same_step else {}
+        flown = Flown(report if same_step else now, now, self.new_observation(), lasts[0], lasts[1], weather)
         rest = range(1, len(self._parts))
         jobs = [self._pool.submit(self._fly_part, k, references, flown) for k in rest] if self._pool else []
         try:
@@ -227,8 +206,9 @@ class EpisodeBatch:
             return
         if flown.report is not flown.now:
             flown.report[:, part] = report[part].T
+            now = self.outdoors.weather()
             for name, values in flown.weather.items():
-                values[part] = self.weather()[name][part]
+                values[part] = now[name][part]
             again = part.start + ended.nonzero()[0]
             for row in again.tolist():
                 flown.last_observations[row] = self.observation_of(row)
@@ -276,16 +256,9 @@ class EpisodeBatch:
         Their weather is that of the options, but for `scenarios` (k,) that carry one.
         """
         begin_rows(self.episodes, missions, rows, self._flown[0][1])
-        carried = {k: each.weather for k, each in enumerate(scenarios) if each is not None and each.weather is not None}
-        for weather in carried.values():
-            known = self.simulations[0].extra
-            if not self.weathered or (weather.extra is not None and known is None):
-                self._expose(weather)
-                self._bind()
-            elif weather.extra is not None and type(weather.extra) is not known:
-                raise ValueError(f"a scenario's disturbance must be a {known.__name__} here, got {weather.extra!r}")
-        if self.weathered:
-            self._begin_conditions(rows, carried)
+        if self.outdoors.admit(scenarios):
+            self._bind()
+        self.outdoors.begin(self.episodes.rows, rows, self.generators, scenarios)
         for row in rows.tolist():
             self.transitions[row] = []
         self.ended[rows], self.starting[rows] = False, True
@@ -294,43 +267,10 @@ class EpisodeBatch:
             if look:
                 self.look(rows)
 
-    def _begin_conditions(self, rows: NDArray[np.int64], carried: dict[int, Weather]) -> None:
-        """Draw the weather and the vehicles of episodes of rows (k,); entry k may carry a weather of its own."""
-        new = rows[self.reseeded[rows]]
-        if new.size:
-            keys = np.array([key_of(self.generators[row]) for row in new.tolist()])
-            give_streams(self.conditions, self.lanes, new, keys)
-            self.reseeded[new] = False
-        which = np.zeros(len(rows), np.int64)
-        self._climate(self.options.weather)
-        for k, weather in carried.items():
-            which[k] = self._climate(weather)
-        climates = np.array([climate for _, climate in self._climates.values()])
-        begin_conditions(self.conditions, self.lanes, self.episodes.rows, rows, climates, which)
-
-    def weather(self) -> dict[str, NDArray[np.float64]]:
-        """Return what moves around all rows, see `weather_at`, as of the last tick; nothing without weather."""
-        return weather_at(self.conditions, self.lanes, self.count) if self.weathered else {}
-
-    def restore_conditions(self, kept: NDArray[np.float64]) -> None:
-        """Go back to the conditions of a snapshot; without any, weather is as it was when the row's stream began."""
-        if kept.size and not self.weathered:
-            self._expose(self.options.weather)
-            self._bind()
-        self.reseeded[:] = not kept.size
-        if kept.size:
-            self.conditions[...] = kept
-        elif self.weathered:
-            self.conditions, self.simulations = STILL, [each.flown_in(False) for each in self.simulations]
-            self._bind()
-
-    def _climate(self, weather: Weather) -> int:
-        """Index of a weather among those that episodes are drawn from."""
-        if weather not in self._climates:
-            spread, depth = self.options.spread_in(weather), -self.options.world.lower[2]
-            climate = climate_of(named_vehicle(self.options.vehicle), weather, spread, depth)
-            self._climates[weather] = len(self._climates), climate
-        return self._climates[weather][0]
+    def restore_outdoors(self, conditions: NDArray[np.float64], disturbance: type | None) -> None:
+        """Go back to the weather of a snapshot."""
+        self.outdoors.restore(conditions, disturbance)
+        self._bind()
 
     def spheres(self, row: int) -> NDArray[np.float64]:
         """The spheres of a row's episode, (k, 4) x, y, z, r in m."""

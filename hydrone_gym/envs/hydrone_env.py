@@ -42,6 +42,7 @@ class Snapshot:
     seed: int | None  # that it was made from
     egocentric: tuple[NDArray[np.float64], NDArray[np.float32]]  # memory and last observation, if that is the interface
     conditions: NDArray[np.float64]  # weather, its stream, and the vehicle as it is; empty where they are not simulated
+    disturbance: type | None  # class of the disturbance in them
     track: Track | None  # flown so far, for pictures; None without `render_mode`
 
 
@@ -146,7 +147,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         """
         row, core = self._core.episodes.rows[0], self._core
         told = {"state": row["state"].copy(), "reference": row["reference"].copy()}
-        return told | ({"conditions": conditions_of(core.conditions, 1, 0)} if core.weathered else {})
+        return told | ({"conditions": conditions_of(core.outdoors.conditions, 1, 0)} if core.outdoors.weathered else {})
 
     @property
     def vehicle(self) -> Vehicle:
@@ -177,11 +178,13 @@ class HydroneEnv(gym.Env[Any, Any]):
         if scenario is None:
             scenario = generate(core.draws, self.world, self.vehicle.radius, self.np_random)
         core.generators = [self.np_random]
-        core.reseeded |= seed is not None
+        core.outdoors.reseeded |= seed is not None
         core.begin(_ONLY, core.missions_of(_ONLY, [scenario]), [scenario])
         self._scenario, self._outcome = scenario, RUNNING
         core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
-        return core.observation_of(0), info_of(core.episodes.report[0].tolist(), core.transitions[0], core.weather())
+        return core.observation_of(0), info_of(
+            core.episodes.report[0].tolist(), core.transitions[0], core.outdoors.weather()
+        )
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one period, the reference moving to the action (4,), m and rad; returns are as the class describes them.
@@ -207,7 +210,7 @@ class HydroneEnv(gym.Env[Any, Any]):
         if report[-1] > 0.0:
             core.note_crossings(slice(0, 1))
         self._outcome = outcome = report[OUTCOME]
-        info, truncated = info_of(report, core.transitions[0], core.weather()), outcome == TIMEOUT
+        info, truncated = info_of(report, core.transitions[0], core.outdoors.weather()), outcome == TIMEOUT
         if outcome != RUNNING:
             info["is_success"] = outcome == GOAL
         return core.observation_of(0), report[len(TERMS)], outcome != RUNNING and not truncated, truncated, info
@@ -231,7 +234,8 @@ class HydroneEnv(gym.Env[Any, Any]):
             random_state=copy.deepcopy(self.np_random.bit_generator.state),  # type: ignore[arg-type]
             seed=self._np_random_seed,
             egocentric=(core.memory.copy(), core.seen.copy()),
-            conditions=core.conditions.copy(),
+            conditions=core.outdoors.conditions.copy(),
+            disturbance=core.outdoors.extra,
             track=core.screen.track(0),
         )
 
@@ -247,7 +251,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             listed = ", ".join(f"{name} (snapshot {theirs!r}, here {own!r})" for name, theirs, own in pairs)
             raise ValueError(f"snapshot is of an environment with other options: {listed}")
         core, self._scenario = self._core, snapshot.scenario
-        core.restore_conditions(snapshot.conditions)
+        core.restore_outdoors(snapshot.conditions, snapshot.disturbance)
         self._outcome = float(snapshot.episodes.report[0, OUTCOME])
         own: list[np.ndarray] = [*core.episodes, core.memory, core.seen]
         for array, kept in zip(own, (*snapshot.episodes, *snapshot.egocentric), strict=True):

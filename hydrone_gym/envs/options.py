@@ -122,8 +122,18 @@ class Options:
     @property
     def weathered(self) -> bool:
         """Whether anything differs from the nominal vehicle in still air and flat water."""
-        exact = self.spread_in(self.weather) == Spread() and self.vehicle.ideal
-        return not (exact and self.weather.still)
+        weather = replace(self.the_weather, spread=self.spread_in(self.the_weather))
+        return not (weather.still and self.the_vehicle.ideal)
+
+    @property
+    def the_vehicle(self) -> Vehicle:
+        """The nominal vehicle."""
+        return named_vehicle(self.vehicle)
+
+    @property
+    def the_weather(self) -> Weather:
+        """The weather."""
+        return named_weather(self.weather)
 
     def differences(self, other: "Options") -> list[str]:
         """Return the names of the options, but for those of pictures, in which another environment differs."""

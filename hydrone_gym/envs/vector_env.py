@@ -99,7 +99,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         observation = self._core.observation()
         begun = np.isin(np.arange(self.num_envs), rows)
         core = self._core
-        return observation, batch_info(core.episodes.report.T, core.transitions, core.weather(), begun)
+        return observation, batch_info(core.episodes.report.T, core.transitions, core.outdoors.weather(), begun)
 
     def _seed(self, seed: Any, rows: NDArray[np.intp]) -> None:
         """Give the rows their random streams."""
@@ -112,7 +112,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         for row in rows:
             if seeds[row] is not None:
                 streams[row] = seeding.np_random(seeds[row])[0]
-                self._core.reseeded[row] = True
+                self._core.outdoors.reseeded[row] = True
 
     def step(
         self, actions: ArrayLike
@@ -137,7 +137,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             core.show(core.starting.nonzero()[0])
         outcome = flown.report[OUTCOME]
         truncated, ended = outcome == TIMEOUT, outcome != RUNNING
-        info = batch_info(flown.now, core.transitions, core.weather())
+        info = batch_info(flown.now, core.transitions, core.outdoors.weather())
         if ended.any():
             last = {"is_success": outcome == GOAL, "_is_success": ended.copy()}
             if same_step:

@@ -17,14 +17,11 @@ from hydrone_gym.control.law import control
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.control.reference import Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
-from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, immersed_step, lagged
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
-from hydrone_gym.physics.parameters import VehicleParams
 from hydrone_gym.physics.rotors import shaft_power
 from hydrone_gym.physics.trigonometry import wrap
 from hydrone_gym.simulation.clock import DT, SUBSTEPS, TICK
-from hydrone_gym.simulation.conditions import AT as CONDITIONS_AT
-from hydrone_gym.simulation.conditions import Noticed, any_rare, sample
+from hydrone_gym.simulation.in_weather import any_rare, sample, takes_for_air, weathered_step
 from hydrone_gym.simulation.outcome import COLLISION, DIVERGED, GOAL, OUT_OF_BOUNDS, ROUGH_TRANSITION, RUNNING
 from hydrone_gym.simulation.storage import (
     AT,
@@ -79,7 +76,7 @@ def substep(b, i, lanes, part, inverses, model, weather):
     state = gather(b, FLOWN_AT.state, i, lanes, State)
     integral = gather(b, FLOWN_AT.integral, i, lanes, Integral)
     attitude = attitude_of(state)
-    air = is_air(state.z) if weather is None else gather(weather, CONDITIONS_AT.noticed + 1, i, lanes, float) > 0.0
+    air = is_air(state.z) if weather is None else takes_for_air(weather, i, lanes)
     medium = medium_at(model.vehicle, air)
     vertical = abs(state.z) <= model.world.zone and model.world.vertical_mode > 0.0
     rates = euler_rates(attitude, state.p, state.q, state.r)
@@ -92,49 +89,11 @@ def substep(b, i, lanes, part, inverses, model, weather):
         noticed = air != is_air(new.z)
         note_crossing(b, i, lanes, noticed, is_air(new.z), (new.vx, new.vy, new.vz), attitude)
     else:
-        new, power, noticed = weathered_step(b, i, lanes, now, speeds, part[1], weather)
+        new, power, noticed, crossing = weathered_step(weather, i, lanes, now, speeds, part[1])
+        note_crossing(b, i, lanes, crossing[0], crossing[1], crossing[2], attitude)
     scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + power * DT)
     scatter(b, FLOWN_AT.integral, i, lanes, select(noticed, zero_like(integral), integral))
     scatter(b, FLOWN_AT.state, i, lanes, new)
-
-
-@inlined
-def weathered_step(b, i, lanes, now, wanted, sub, weather):
-    """Advance lane i as the vehicle really is, in its weather; `sub` counts the tick's physics steps at its end.
-
-    Returns the new state, the rotors' shaft power (W), and whether the controller now notices another medium.
-    """
-    state, attitude, driven = now.state, now.attitude, now.air
-    vehicle = gather(weather, CONDITIONS_AT.vehicle, i, lanes, VehicleParams)
-    real = gather(weather, CONDITIONS_AT.real, i, lanes, Unmodelled)
-    rotors = gather(weather, CONDITIONS_AT.rotors, i, lanes, Rotors)
-    fluid = gather(weather, CONDITIONS_AT.fluid, i, lanes, Fluid)
-    noticed = gather(weather, CONDITIONS_AT.noticed, i, lanes, Noticed)
-    speeds = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
-    after = sub * DT - 0.5 * TICK  # the end of this step, from the middle of the tick
-    new, medium = immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after - DT, DT)
-    air = is_air(new.z - (fluid.elevation + after * fluid.elevation_rate))
-    crossed = air != (noticed.air > 0.0)
-    water = (
-        fluid.water_x + after * fluid.water_rate_x,
-        fluid.water_y + after * fluid.water_rate_y,
-        fluid.water_z + after * fluid.water_rate_z,
-    )
-    note_crossing(b, i, lanes, crossed, air, (new.vx - water[0], new.vy - water[1], new.vz - water[2]), attitude)
-    waited = noticed.waited + DT if air != driven else 0.0
-    turned = waited > real.medium_delay
-    driven_now = air if turned else driven
-    scatter(
-        weather,
-        CONDITIONS_AT.noticed,
-        i,
-        lanes,
-        Noticed(1.0 if air else 0.0, 1.0 if driven_now else 0.0, 0.0 if turned else waited),
-    )
-    # the rotors of the other medium start from rest
-    later = lagged(rotors, wanted, real.keep_air if driven else real.keep_water)
-    scatter(weather, CONDITIONS_AT.rotors, i, lanes, select(turned, zero_like(later), later))
-    return new, shaft_power(medium, speeds), turned
 
 
 @inlined

@@ -1,7 +1,7 @@
 """The conditions a lane flies in: the vehicle as it is, and the weather around it.
 
 They lie beside the lanes like the obstacles do, number k of lane i at ``k * lanes + i``, and only the kernel for
-weather reads them. `begin_conditions` draws those of an episode from its key; `sample` moves the weather on by a tick.
+weather reads them, see `in_weather`. `begin_conditions` draws those of an episode from its key.
 """
 
 import math
@@ -11,28 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel
-from hydrone_gym._memory import gather, offsets_of, packed, pointer, scatter, select, size_of, unpacked
-from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, near_water_factor, unmodelled_of
-from hydrone_gym.physics.kinematics import State
+from hydrone_gym._memory import gather, offsets_of, packed, pointer, scatter, size_of, unpacked
+from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, unmodelled_of
 from hydrone_gym.physics.parameters import Hull, VehicleParams, hull_of, params_of
 from hydrone_gym.simulation.clock import DT, TICK
-from hydrone_gym.simulation.outcome import RUNNING
-from hydrone_gym.simulation.storage import FLOWN_AT, OUTCOME, TICKS
 from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import Vehicle
 from hydrone_gym.weather import current as currents
 from hydrone_gym.weather import waves
 from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.current import CurrentParams, Eddies
-from hydrone_gym.weather.disturbance import MOST, flow_of
-from hydrone_gym.weather.noise import Key, derived, kicks, uniforms
+from hydrone_gym.weather.disturbance import MOST
+from hydrone_gym.weather.noise import Key, derived, uniforms
+from hydrone_gym.weather.spread import SpreadParams, draw_hull, spread_params
 from hydrone_gym.weather.waves import Sea, SeaParams
 from hydrone_gym.weather.weather import Spread, Weather
 from hydrone_gym.weather.wind import Gusts, WindParams
 
 # Which pairs of an episode's key are for what.
-_DIRECTIONS, _VEHICLE, _GUSTS, _EDDIES, _WAVES, _CHANCES, _TICKS = 0.0, 2.0, 10.0, 13.0, 14.0, 20.0, 64.0
-_A_TICK = 4.0  # pairs that a tick takes
+_DIRECTIONS, _VEHICLE, _GUSTS, _EDDIES, _WAVES, _CHANCES, TICKS_FROM = 0.0, 2.0, 10.0, 13.0, 14.0, 20.0, 64.0
+A_TICK = 4.0  # pairs that a tick takes
 _WEATHER = 1  # the child of a seed that is for weather
 
 
@@ -94,23 +92,6 @@ class Conditions(NamedTuple):
     chances: Chances  # a disturbance's numbers come after
 
 
-class SpreadParams(NamedTuple):
-    """`hydrone_gym.weather.Spread` as numbers: relative half-widths, and ranges."""
-
-    mass: float
-    thrust: float
-    inertia: float
-    drag: float
-    lag_air_low: float
-    lag_air_high: float
-    lag_water_low: float
-    lag_water_high: float
-    rotor_drag_low: float
-    rotor_drag_high: float
-    height_low: float
-    height_high: float
-
-
 class Climate(NamedTuple):
     """What the conditions of episodes are drawn from: a vehicle, its spread, and a weather."""
 
@@ -125,24 +106,19 @@ class Climate(NamedTuple):
 
 
 AT = offsets_of(Conditions)
-_EXTRA = size_of(Conditions)  # a disturbance's numbers
-CONDITIONS = _EXTRA + MOST
+EXTRA = size_of(Conditions)  # a disturbance's numbers
+CONDITIONS = EXTRA + MOST
 _EXTRA_OF_CLIMATE = size_of(Climate)
-_RADIUS = offsets_of(Unmodelled).near_water_radius
-_SHEAR = offsets_of(WindParams).shear
-_SECOND = AT.sea + offsets_of(Sea).second  # amplitude of a sea's second component
+_FLUID = offsets_of(Fluid)
 
 
 def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float) -> np.ndarray:
     """Pack what episodes of a vehicle in a weather are drawn from, over water of a depth (m)."""
-    own = vehicle.rotor_lag_air, vehicle.rotor_lag_water, vehicle.rotor_drag, vehicle.height
-    given = spread.rotor_lag_air, spread.rotor_lag_water, spread.rotor_drag, spread.height
-    ranges = [end for value, pair in zip(own, given, strict=True) for end in (pair or (value, value))]
     directions = weather.wind_direction, weather.current_direction, weather.wave_direction
     numbers = packed(
         Climate(
             hull_of(vehicle),
-            SpreadParams(spread.mass, spread.thrust, spread.inertia, spread.drag, *ranges),
+            spread_params(spread, vehicle),
             winds.wind_params(weather.wind, weather.turbulence, weather.shear, TICK),
             currents.current_params(weather.current, weather.current_variation, TICK),
             waves.sea_params(weather.wave_height, weather.wave_period, weather.sea == "jonswap", depth),
@@ -162,76 +138,15 @@ def _heading(direction, share):
 
 
 @inlined
-def _factor(width, share):
-    return 1.0 + width * (2.0 * share - 1.0)
-
-
-@inlined
-def _within(low, high, share):
-    return low + (high - low) * share
-
-
-@inlined
-def _hull_of_episode(hull, spread, key):
-    """Draw the vehicle of an episode."""
-    mass, air = uniforms(key, _VEHICLE)
-    water, inertia_x = uniforms(key, _VEHICLE + 1.0)
-    inertia_y, inertia_z = uniforms(key, _VEHICLE + 2.0)
-    drag, turning = uniforms(key, _VEHICLE + 3.0)
-    lag_air, lag_water = uniforms(key, _VEHICLE + 4.0)
-    flapping, height = uniforms(key, _VEHICLE + 5.0)
-    in_air, in_water = _factor(spread.thrust, air), _factor(spread.thrust, water)
-    moving, rotating = _factor(spread.drag, drag), _factor(spread.drag, turning)
-    return Hull(
-        hull.mass * _factor(spread.mass, mass),
-        hull.gravity,
-        hull.arm,
-        hull.yaw_arm_air,
-        hull.inertia_x * _factor(spread.inertia, inertia_x),
-        hull.inertia_y * _factor(spread.inertia, inertia_y),
-        hull.inertia_z * _factor(spread.inertia, inertia_z),
-        hull.volume,
-        hull.buoyancy_offset,
-        hull.restoring_mass_share,
-        hull.restoring_roll_coupling,
-        hull.added_mass * moving,
-        hull.added_inertia * rotating,
-        hull.drag_x * moving,
-        hull.drag_y * moving,
-        hull.drag_z * moving,
-        hull.rotational_drag_x * rotating,
-        hull.rotational_drag_y * rotating,
-        hull.rotational_drag_z * rotating,
-        hull.thrust_air * in_air,
-        hull.thrust_water * in_water,
-        hull.torque_air * in_air,
-        hull.torque_water * in_water,
-        hull.rotor_limit_air,
-        hull.rotor_limit_water,
-        hull.radius,
-        _within(spread.height_low, spread.height_high, height),
-        _within(spread.lag_air_low, spread.lag_air_high, lag_air),
-        _within(spread.lag_water_low, spread.lag_water_high, lag_water),
-        _within(spread.rotor_drag_low, spread.rotor_drag_high, flapping),
-        hull.thrust_water_curve_0 * in_water,
-        hull.thrust_water_curve_1 * in_water,
-        hull.thrust_water_curve_2 * in_water,
-        hull.near_water_radius,
-        hull.medium_delay,
-        hull.hover_speed,
-    )
-
-
-@inlined
 def _begin(memory, i, lanes, row, numbers):
     """Draw the conditions of the episode that lane i begins."""
     climate, stream = gather(numbers, 0, 0, 1, Climate), gather(memory, AT.stream, i, lanes, Stream)
     for k in range(MOST):
-        memory[(_EXTRA + k) * lanes + i] = numbers[_EXTRA_OF_CLIMATE + k]
+        memory[(EXTRA + k) * lanes + i] = numbers[_EXTRA_OF_CLIMATE + k]
     key = derived(stream.key, stream.episodes)
     scatter(memory, AT.stream, i, lanes, Stream(stream.key, stream.episodes + 1.0))
     scatter(memory, AT.key, i, lanes, key)
-    hull = _hull_of_episode(climate.hull, climate.spread, key)
+    hull = draw_hull(climate.hull, climate.spread, key, _VEHICLE)
     vehicle = params_of(hull)
     scatter(memory, AT.vehicle, i, lanes, vehicle)
     scatter(memory, AT.real, i, lanes, unmodelled_of(hull, DT))
@@ -251,12 +166,12 @@ def _begin(memory, i, lanes, row, numbers):
     sea = waves.draw_sea(climate.sea, headings.waves, key, _WAVES)
     scatter(memory, AT.sea, i, lanes, sea)
     place = (row.state[0], row.state[1], row.state[2])
-    swell = _add_rest(waves.add_wave(waves.calm(), sea.first, place, (0.0, 0.0), 0.0), sea, place, (0.0, 0.0), 0.0)
+    swell = add_rest(waves.add_wave(waves.calm(), sea.first, place, (0.0, 0.0), 0.0), sea, place, (0.0, 0.0), 0.0)
     gusts, profile = gather(memory, AT.gusts, i, lanes, Gusts), winds.shear_profile(place[2], climate.wind.shear)
     wind = winds.velocity(gusts, climate.wind, headings.wind, profile)
     eddies = gather(memory, AT.eddies, i, lanes, Eddies)
     flow = currents.velocity(eddies, climate.current, headings.current)
-    scatter(memory, AT.fluid, i, lanes, _fluid(wind, wind, flow, flow, swell, 1.0))
+    scatter(memory, AT.fluid, i, lanes, fluid_of(wind, wind, flow, flow, swell, 1.0))
     air = 1.0 if is_air(place[2] - swell.elevation) else 0.0
     scatter(memory, AT.noticed, i, lanes, Noticed(air, air, 0.0))
     # its rotors hold it already: four in air, the two that lift in water
@@ -266,7 +181,7 @@ def _begin(memory, i, lanes, row, numbers):
 
 
 @inlined
-def _add_rest(swell, sea, place, velocity, time):
+def add_rest(swell, sea, place, velocity, time):
     """Add all components of a sea but the first."""
     swell = waves.add_wave(swell, sea.second, place, velocity, time)
     swell = waves.add_wave(swell, sea.third, place, velocity, time)
@@ -283,13 +198,12 @@ def key_of(generator: np.random.Generator) -> tuple[float, float]:
 
 def weather_at(conditions: NDArray[np.float64], lanes: int, count: int) -> dict[str, NDArray[np.float64]]:
     """Return what moves around rows [0, count): `wind` (n, 3) and `water` (n, 3) in m/s, `elevation` (n,) in m."""
-    blocks = conditions.reshape(len(conditions), CONDITIONS, lanes)[:, AT.fluid : AT.fluid + size_of(Fluid)]
-    fluid = blocks.transpose(0, 2, 1).reshape(-1, size_of(Fluid))[:count]
-    at = offsets_of(Fluid)
+    blocks = conditions.reshape(len(conditions), CONDITIONS, lanes)
+    air, water, elevation = AT.fluid + _FLUID.air_x, AT.fluid + _FLUID.water_x, AT.fluid + _FLUID.elevation
     return {
-        "wind": fluid[:, at.air_x : at.air_x + 3],
-        "water": fluid[:, at.water_x : at.water_x + 3],
-        "elevation": fluid[:, at.elevation],
+        "wind": blocks[:, air : air + 3].transpose(0, 2, 1).reshape(-1, 3)[:count],
+        "water": blocks[:, water : water + 3].transpose(0, 2, 1).reshape(-1, 3)[:count],
+        "elevation": blocks[:, elevation].reshape(-1)[:count],
     }
 
 
@@ -326,56 +240,7 @@ def begin_conditions(conditions, lanes, rows, order, climates, which):
 
 
 @inlined
-def sample(memory, i, lanes, b, rare, extra):
-    """Move lane i's weather on by a tick, and look at it where the vehicle will be in the middle of it.
-
-    `rare` says whether any lane has what `any_rare` looks for; `extra` is the class of a disturbance, or None.
-    """
-    s = gather(b, FLOWN_AT.state, i, lanes, State)
-    ticks = gather(b, TICKS, i, lanes, float)
-    half, time = 0.5 * TICK, (ticks + 0.5) * TICK
-    place = (s.x + half * s.vx, s.y + half * s.vy, s.z + half * s.vz)
-    key, n = gather(memory, AT.key, i, lanes, Key), _TICKS + _A_TICK * ticks
-    n1, n2 = kicks(key, n)
-    n3, n4 = kicks(key, n + 1.0)
-    n5, n6 = kicks(key, n + 2.0)
-    n7, _ = kicks(key, n + 3.0)
-    wind, gusts = gather(memory, AT.wind, i, lanes, WindParams), gather(memory, AT.gusts, i, lanes, Gusts)
-    headings = gather(memory, AT.headings, i, lanes, Headings)
-    later = winds.next_gusts(gusts, wind, (n1, n2, n3, n4, n5))
-    profile = winds.shear_profile(place[2], wind.shear) if rare else 1.0
-    air = winds.velocity(gusts, wind, headings.wind, profile)
-    next_air = winds.velocity(later, wind, headings.wind, profile)
-    current, eddies = gather(memory, AT.current, i, lanes, CurrentParams), gather(memory, AT.eddies, i, lanes, Eddies)
-    new = currents.next_eddies(eddies, current, (n6, n7))
-    flow = currents.velocity(eddies, current, headings.current)
-    next_flow = currents.velocity(new, current, headings.current)
-    sea = gather(memory, AT.sea, i, lanes, Sea)
-    swell = waves.add_wave(waves.calm(), sea.first, place, (s.vx, s.vy), time)
-    near = 1.0
-    if rare:
-        swell = _add_rest(swell, sea, place, (s.vx, s.vy), time)
-        near = near_water_factor(place[2] - swell.elevation, gather(memory, AT.real + _RADIUS, i, lanes, float))
-    if extra is not None:
-        chances, numbers = gather(memory, AT.chances, i, lanes, Chances), gather(memory, _EXTRA, i, lanes, extra)
-        more_air, more_water = flow_of(numbers, chances, place, time)
-        air, next_air = _sum(air, more_air), _sum(next_air, more_air)
-        swell = waves.carried(swell, more_water)
-    # where a flight has ended its time stands still, and so does its weather
-    running = gather(b, OUTCOME, i, lanes, float) == RUNNING
-    fluid = gather(memory, AT.fluid, i, lanes, Fluid)
-    scatter(memory, AT.gusts, i, lanes, select(running, later, gusts))
-    scatter(memory, AT.eddies, i, lanes, select(running, new, eddies))
-    scatter(memory, AT.fluid, i, lanes, select(running, _fluid(air, next_air, flow, next_flow, swell, near), fluid))
-
-
-@inlined
-def _sum(a, b):
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@inlined
-def _fluid(air, next_air, flow, next_flow, swell, near_water):
+def fluid_of(air, next_air, flow, next_flow, swell, near_water):
     """Put air, current and waves together: velocities at both ends of a tick (m/s), and a `Swell`."""
     rate = 1.0 / TICK
     return Fluid(
@@ -395,14 +260,3 @@ def _fluid(air, next_air, flow, next_flow, swell, near_water):
         swell.rate,
         near_water,
     )
-
-
-@inlined
-def any_rare(memory, lanes):
-    """Whether any lane has what most weather has not, and what costs: an irregular sea, shear, a near-water effect."""
-    most = 0.0
-    for i in range(lanes):
-        shear = gather(memory, AT.wind + _SHEAR, i, lanes, float)
-        most = max(most, shear + gather(memory, AT.real + _RADIUS, i, lanes, float))
-        most = max(most, gather(memory, _SECOND, i, lanes, float))
-    return most > 0.0

@@ -5,6 +5,7 @@ wind        a mean and Dryden gusts
 current     a mean and a Gauss-Markov variation
 waves       regular, or a few components of a JONSWAP spectrum
 disturbance what else moves air and water, in a file of one's own
+spread      the vehicle of an episode, drawn around the nominal one
 weather     `Weather`, `Spread`, and the named levels
 """
 

@@ -145,6 +145,10 @@ def _component(sea, amplitude, quarter, direction, key, n):
 @inlined
 def draw_sea(sea, direction, key, n):
     """Draw the waves of an episode, all running to `direction` (cosine, sine), from pairs n to n + 3 of a key."""
+    if sea.others == 0.0:
+        one = _component(sea, sea.first, 0.0, direction, key, n)
+        none = Component(0.0, one.k, one.x, one.y, one.omega, one.phase, one.q, 0.0)
+        return Sea(one, none, none, none)
     return Sea(
         _component(sea, sea.first, 0.0, direction, key, n),
         _component(sea, sea.others, 1.0, direction, key, n),

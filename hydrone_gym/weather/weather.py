@@ -157,8 +157,8 @@ def _level(level: int, wind: float, current: float, height: float, period: float
         rotor_drag=(ROTOR_DRAG * (1.0 - drag), ROTOR_DRAG * (1.0 + drag)),
         height=(0.135, 0.2),  # as in the simulator of the vehicle's authors
     )
-    waves = {"wave_height": height, "wave_period": period}
-    return Weather(wind=wind, current=current, **waves, spread=spread, name=f"level {level}")
+    name = f"level {level}"
+    return Weather(wind=wind, current=current, wave_height=height, wave_period=period, spread=spread, name=name)
 
 
 LEVELS = (

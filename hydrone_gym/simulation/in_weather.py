@@ -1,0 +1,142 @@
+"""The part of the kernel that only flies in weather: the weather moves on, and the vehicle flies as it is."""
+
+from hydrone_gym._jit import inlined
+from hydrone_gym._memory import gather, offsets_of, scatter, select, zero_like
+from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, immersed_step, lagged, near_water_factor
+from hydrone_gym.physics.kinematics import State
+from hydrone_gym.physics.parameters import VehicleParams
+from hydrone_gym.physics.rotors import shaft_power
+from hydrone_gym.simulation.clock import DT, TICK
+from hydrone_gym.simulation.conditions import (
+    A_TICK,
+    AT,
+    EXTRA,
+    TICKS_FROM,
+    Chances,
+    Headings,
+    Noticed,
+    add_rest,
+    fluid_of,
+)
+from hydrone_gym.simulation.outcome import RUNNING
+from hydrone_gym.simulation.storage import FLOWN_AT, OUTCOME, TICKS
+from hydrone_gym.surface import is_air
+from hydrone_gym.weather import current as currents
+from hydrone_gym.weather import waves
+from hydrone_gym.weather import wind as winds
+from hydrone_gym.weather.current import CurrentParams, Eddies
+from hydrone_gym.weather.disturbance import flow_of
+from hydrone_gym.weather.noise import Key, kicks
+from hydrone_gym.weather.waves import Sea
+from hydrone_gym.weather.wind import Gusts, WindParams
+
+_RADIUS = AT.real + offsets_of(Unmodelled).near_water_radius
+_SHEAR = AT.wind + offsets_of(WindParams).shear
+_SECOND = AT.sea + offsets_of(Sea).second  # amplitude of a sea's second component
+_DRIVEN = AT.noticed + offsets_of(Noticed).driven
+
+
+@inlined
+def any_rare(memory, lanes):
+    """Whether any lane has what most weather has not, and what costs: an irregular sea, shear, a near-water effect."""
+    most = 0.0
+    for i in range(lanes):
+        shear = gather(memory, _SHEAR, i, lanes, float)
+        most = max(most, shear + gather(memory, _RADIUS, i, lanes, float))
+        most = max(most, gather(memory, _SECOND, i, lanes, float))
+    return most > 0.0
+
+
+@inlined
+def sample(memory, i, lanes, b, rare, extra):
+    """Move lane i's weather on by a tick, and look at it where the vehicle will be in the middle of it.
+
+    `rare` says whether any lane has what `any_rare` looks for; `extra` is the class of a disturbance, or None.
+    """
+    s = gather(b, FLOWN_AT.state, i, lanes, State)
+    ticks = gather(b, TICKS, i, lanes, float)
+    half, time = 0.5 * TICK, (ticks + 0.5) * TICK
+    place = (s.x + half * s.vx, s.y + half * s.vy, s.z + half * s.vz)
+    key, n = gather(memory, AT.key, i, lanes, Key), TICKS_FROM + A_TICK * ticks
+    n1, n2 = kicks(key, n)
+    n3, n4 = kicks(key, n + 1.0)
+    n5, n6 = kicks(key, n + 2.0)
+    n7, _ = kicks(key, n + 3.0)
+    wind, gusts = gather(memory, AT.wind, i, lanes, WindParams), gather(memory, AT.gusts, i, lanes, Gusts)
+    headings = gather(memory, AT.headings, i, lanes, Headings)
+    later = winds.next_gusts(gusts, wind, (n1, n2, n3, n4, n5))
+    profile = winds.shear_profile(place[2], wind.shear) if rare else 1.0
+    air = winds.velocity(gusts, wind, headings.wind, profile)
+    next_air = winds.velocity(later, wind, headings.wind, profile)
+    current, eddies = gather(memory, AT.current, i, lanes, CurrentParams), gather(memory, AT.eddies, i, lanes, Eddies)
+    new = currents.next_eddies(eddies, current, (n6, n7))
+    flow = currents.velocity(eddies, current, headings.current)
+    next_flow = currents.velocity(new, current, headings.current)
+    sea = gather(memory, AT.sea, i, lanes, Sea)
+    swell = waves.add_wave(waves.calm(), sea.first, place, (s.vx, s.vy), time)
+    near = 1.0
+    if rare:
+        swell = add_rest(swell, sea, place, (s.vx, s.vy), time)
+        near = near_water_factor(place[2] - swell.elevation, gather(memory, _RADIUS, i, lanes, float))
+    if extra is not None:
+        chances, numbers = gather(memory, AT.chances, i, lanes, Chances), gather(memory, EXTRA, i, lanes, extra)
+        more_air, more_water = flow_of(numbers, chances, place, time)
+        air, next_air = _sum(air, more_air), _sum(next_air, more_air)
+        swell = waves.carried(swell, more_water)
+    # where a flight has ended its time stands still, and so does its weather
+    running = gather(b, OUTCOME, i, lanes, float) == RUNNING
+    fluid = gather(memory, AT.fluid, i, lanes, Fluid)
+    scatter(memory, AT.gusts, i, lanes, select(running, later, gusts))
+    scatter(memory, AT.eddies, i, lanes, select(running, new, eddies))
+    scatter(memory, AT.fluid, i, lanes, select(running, fluid_of(air, next_air, flow, next_flow, swell, near), fluid))
+
+
+@inlined
+def _sum(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def takes_for_air(memory, i, lanes):
+    """Whether lane i's controller takes it to be in air."""
+    return gather(memory, _DRIVEN, i, lanes, float) > 0.0
+
+
+@inlined
+def weathered_step(memory, i, lanes, now, wanted, sub):
+    """Advance lane i as the vehicle really is, in its weather; `sub` counts the tick's physics steps at its end.
+
+    Returns the new state, the rotors' shaft power (W), whether the controller now notices another medium, and the
+    crossing: whether there is one, whether into air, and the velocity relative to the water (x, y, z in m/s).
+    """
+    state, attitude, driven = now.state, now.attitude, now.air
+    vehicle = gather(memory, AT.vehicle, i, lanes, VehicleParams)
+    real = gather(memory, AT.real, i, lanes, Unmodelled)
+    rotors = gather(memory, AT.rotors, i, lanes, Rotors)
+    fluid = gather(memory, AT.fluid, i, lanes, Fluid)
+    noticed = gather(memory, AT.noticed, i, lanes, Noticed)
+    speeds = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
+    after = sub * DT - 0.5 * TICK  # the end of this step, from the middle of the tick
+    new, medium = immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after - DT, DT)
+    air = is_air(new.z - (fluid.elevation + after * fluid.elevation_rate))
+    crossed = air != (noticed.air > 0.0)
+    water = (
+        fluid.water_x + after * fluid.water_rate_x,
+        fluid.water_y + after * fluid.water_rate_y,
+        fluid.water_z + after * fluid.water_rate_z,
+    )
+    relative = (new.vx - water[0], new.vy - water[1], new.vz - water[2])
+    waited = noticed.waited + DT if air != driven else 0.0
+    turned = waited > real.medium_delay
+    driven_now = air if turned else driven
+    scatter(
+        memory,
+        AT.noticed,
+        i,
+        lanes,
+        Noticed(1.0 if air else 0.0, 1.0 if driven_now else 0.0, 0.0 if turned else waited),
+    )
+    # the rotors of the other medium start from rest
+    later = lagged(rotors, wanted, real.keep_air if driven else real.keep_water)
+    scatter(memory, AT.rotors, i, lanes, select(turned, zero_like(later), later))
+    return new, shaft_power(medium, speeds), turned, (crossed, air, relative)
