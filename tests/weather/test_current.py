@@ -6,7 +6,7 @@ import pytest
 from hydrone_gym._jit import kernel
 from hydrone_gym.weather import current as currents
 from hydrone_gym.weather.current import TIME, Eddies, current_params
-from hydrone_gym.weather.noise import Key, normals
+from hydrone_gym.weather.noise import Key, kicks
 
 SPEED, VARIATION, DIRECTION = 0.4, 0.3, (-0.28, 0.96)
 
@@ -22,7 +22,7 @@ def flow(current, direction, every, out):
         for j in range(samples):
             out[0, i, j], out[1, i, j] = currents.velocity(eddies, current, direction)
             for _ in range(every):
-                eddies = currents.next_eddies(eddies, current, normals(key, n))
+                eddies = currents.next_eddies(eddies, current, kicks(key, n))
                 n += 1.0
 
 

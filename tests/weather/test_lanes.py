@@ -13,7 +13,7 @@ from hydrone_gym.weather import current as currents
 from hydrone_gym.weather import waves
 from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.current import Eddies
-from hydrone_gym.weather.noise import Key, derived, normals
+from hydrone_gym.weather.noise import Key, derived, kicks, normals
 from hydrone_gym.weather.wind import Gusts
 
 LANES = 16
@@ -41,8 +41,8 @@ def tick(given, made, i, lanes):
         given[5 * lanes + i], given[6 * lanes + i], given[7 * lanes + i], given[8 * lanes + i], given[9 * lanes + i]
     )
     eddies = Eddies(given[10 * lanes + i], given[11 * lanes + i])
-    a, b = normals(key, n)
-    c, d = normals(key, n + 1.0)
+    a, b = kicks(key, n)
+    c, d = kicks(key, n + 1.0)
     e, f = normals(key, n + 2.0)
     gusts = winds.next_gusts(gusts, WIND, (a, b, c, d, e))
     eddies = currents.next_eddies(eddies, CURRENT, (f, a))

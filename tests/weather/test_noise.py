@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from hydrone_gym._jit import kernel
-from hydrone_gym.weather.noise import Key, derived, normals, uniforms
+from hydrone_gym.weather.noise import Key, derived, kicks, normals, uniforms
 
 COUNT = 60_000
 KEYS = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (4294967295.0, 4294967295.0), (2718281828.0, 3141592653.0)]
@@ -21,6 +21,12 @@ def uniforms_of(low, high, numbers, out):
 def normals_of(low, high, numbers, out):
     for i in range(numbers.size):
         out[0, i], out[1, i] = normals(Key(low, high), numbers[i])
+
+
+@kernel
+def kicks_of(low, high, numbers, out):
+    for i in range(numbers.size):
+        out[0, i], out[1, i] = kicks(Key(low, high), numbers[i])
 
 
 @kernel
@@ -110,6 +116,24 @@ def test_normal():
         assert stats.kstest(z, "norm").pvalue > 1e-4
         assert 4.2 < np.abs(z).max() < 6.8
     assert_independent(*stats.norm.cdf(numbers))
+
+
+def test_kicks_are_sums_of_four_bytes():
+    """Of the two hashes; so their mean is exactly 0 and their variance 1 over all of them, their kurtosis -0.3."""
+    uniform, sums = drawn(uniforms_of, KEYS[-1]), drawn(kicks_of, KEYS[-1])
+    whole = (uniform * 2.0**32 - 0.5).astype(np.uint32)
+    expected = whole.view(np.uint8).reshape(2, COUNT, 4).sum(2, dtype=float) - 510.0
+    np.testing.assert_allclose(sums, expected / np.sqrt((256.0**2 - 1.0) / 3.0), rtol=1e-14, atol=1e-14)
+    numbers = drawn(kicks_of, KEYS[-1], count=400_000)
+    np.testing.assert_allclose(numbers.mean(1), 0.0, atol=7.2e-3)
+    np.testing.assert_allclose(numbers.var(1), 1.0, atol=7.2e-3 * np.sqrt(1.7))
+    np.testing.assert_allclose(stats.skew(numbers, axis=1), 0.0, atol=0.02)
+    np.testing.assert_allclose(stats.kurtosis(numbers, axis=1), -0.3, atol=0.03)
+    bound = 4.5 / np.sqrt(numbers.shape[1])
+    first, second = numbers
+    for a, b in ((first, second), (first[:-1], first[1:]), (first[:-1], second[1:]), (second[:-1], second[1:])):
+        assert abs(np.corrcoef(a, b)[0, 1]) < bound
+        assert abs(np.corrcoef(a**2, b**2)[0, 1]) < bound
 
 
 @pytest.mark.parametrize("other", [(1.0, 0.0), (0.0, 1.0), (2654435769.0, 0.0), (2718281828.0, 0.0), KEYS[-1]])

@@ -39,6 +39,11 @@ def swell_of(sea, place, velocity, time):
     return waves.add_wave(swell, sea.fourth, place, velocity, time)
 
 
+@kernel
+def carried_by(swell, velocity):
+    return waves.carried(swell, velocity)
+
+
 def swell_at(sea, x, y, z, t, velocity=(0.0, 0.0)):
     return swell_of(sea, (float(x), float(y), float(z)), velocity, float(t))
 
@@ -134,6 +139,13 @@ def test_elevation_seen_on_the_move(sea):
         swell = swell_at(sea, *at, tuple(velocity))
         by_x, by_y, _, by_t = derivatives(lambda *where: swell_at(sea, *where).elevation, at)
         np.testing.assert_allclose(swell.rate, by_t + by_x * velocity[0] + by_y * velocity[1], rtol=0, atol=1e-8)
+
+
+def test_waves_on_moving_water(sea):
+    """Its velocity is added to that of the waves, and to nothing else."""
+    swell = swell_at(sea[0], 1.0, 2.0, -0.3, 4.0)
+    more = np.subtract(carried_by(swell, (0.3, -0.4, 0.1)), swell)
+    np.testing.assert_allclose(more, [0.0, 0.0, 0.3, -0.4, 0.1, 0.0, 0.0, 0.0], rtol=0, atol=1e-15)
 
 
 def test_crests_run_to_the_direction():
