@@ -61,6 +61,7 @@ def test_first_draw_is_as_any_later_one():
     series = flown(0.05, 40, 50_000, 3)
     np.testing.assert_allclose(series.std(1), VARIATION * SPEED, rtol=0.02)
     np.testing.assert_allclose(series.mean(1) / (VARIATION * SPEED), 0.0, atol=0.02)
+    assert max(abs(np.corrcoef(*series[:, :, k])[0, 1]) for k in range(3)) < 0.02
 
 
 def test_mean_flows_to_its_direction():

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from hydrone_gym._jit import kernel
+from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.weather import waves
 from hydrone_gym.weather.noise import Key
 from hydrone_gym.weather.waves import COMPONENTS, GRAVITY, draw_sea, sea_params, wave_number
@@ -82,11 +83,15 @@ def places(depth, count=40):
 def test_dispersion(depth, period):
     omega = 2.0 * np.pi / period
     k = wave_number(omega, depth)
-    solved = brentq(lambda k: GRAVITY * k * np.tanh(k * depth) - omega**2, 1e-6, 1e4, xtol=1e-300, rtol=1e-14)
-    np.testing.assert_allclose(k, solved, rtol=2e-13)
+    solved = brentq(lambda k: GRAVITY * k * np.tanh(k * depth) - omega**2, 1e-6, 1e4, xtol=1e-300, rtol=1e-15)
+    np.testing.assert_allclose(k, solved, rtol=1e-14)
     drawn_wave = drawn(sea_params(0.01, period, False, depth), DIRECTION, KEY, 0.0).first
     np.testing.assert_allclose([drawn_wave.omega, drawn_wave.k], [omega, k], rtol=1e-14)
     np.testing.assert_allclose([drawn_wave.x, drawn_wave.y], DIRECTION, rtol=1e-14)
+
+
+def test_gravity_is_that_of_the_vehicle():
+    assert GRAVITY == HYDRONE.gravity
 
 
 def test_water_is_neither_made_nor_turned(sea):
