@@ -91,7 +91,7 @@ def test_dispersion(depth, period):
 
 
 def test_gravity_is_that_of_the_vehicle():
-    assert GRAVITY == HYDRONE.gravity
+    assert HYDRONE.gravity == GRAVITY
 
 
 def test_water_is_neither_made_nor_turned(sea):
