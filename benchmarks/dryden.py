@@ -110,8 +110,8 @@ def sheet(measured: dict[str, Any]) -> Sheet:
         ("wind (m/s)", "step (ms)", "axis", "σ (m/s)", "here", "RotorPy", "time (s)", "here", "RotorPy"),
         rows,
         [
-            f"RotorPy {measured['version']}. Time: until the autocorrelation has fallen to 1/e. What is measured is good "
-            "to 2 % here and to 20 % of RotorPy."
+            f"RotorPy {measured['version']}. Time: until the autocorrelation has fallen to 1/e. Measured figures are "
+            "good to 2 % here and to 20 % of RotorPy."
         ],
     )
 
