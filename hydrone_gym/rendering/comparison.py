@@ -28,7 +28,7 @@ _ROW = 0.37  # inches a policy takes
 _EDGE = "#333333"
 _RIM: dict[str, Any] = {"markeredgecolor": _EDGE, "markeredgewidth": 0.5}
 _MUTED = "#5a6570"
-_LABEL, _TITLE = 22, 44  # characters that fit
+_LABEL, _TITLE = 22, 42  # characters that fit
 
 
 def colour(index: int) -> str:

@@ -174,7 +174,7 @@ def _finished(
     look: Look = {"ncols": columns, "frameon": False, "columnspacing": 1.4, "handlelength": 1.6}
     with rc_context(style.FONTS):
         scene.figure.legend(handles=handles, loc="lower center", **look)
-        scene.figure.suptitle(title, y=0.975)
+        scene.figure.suptitle(title, y=0.975, wrap=True)
     return scene.figure
 
 
