@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from textwrap import shorten
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -104,6 +105,7 @@ def _predicting(model: Any) -> Callable[[NDArray[np.float32], Any, bool], _Rows]
     name, seen, chosen = type(model).__name__, model.observation_space, model.action_space
     if (seen, chosen) != (SEEN, CHOSEN):
         discrete = "" if hasattr(chosen, "low") else "; an algorithm for discrete actions cannot choose a reference"
+        seen, chosen = (shorten(str(space), 100, placeholder=" …") for space in (seen, chosen))
         raise ValueError(f"{name} was trained on observations {seen} and actions {chosen}; {INTERFACE}{discrete}")
     scale = getattr(model, "get_vec_normalize_env", lambda: None)()
 
