@@ -26,7 +26,9 @@ FORMAT = "hydrone_gym agent"
 VERSION = 1
 TEXT = "agent.yaml"
 TENSORS = "tensors.npz"
-_KINDS = dict.fromkeys(("name", "algorithm", "environment", "observation"), str) | dict.fromkeys(("network", "tensors"), dict)
+_KINDS = dict.fromkeys(("name", "algorithm", "environment", "observation"), str) | dict.fromkeys(
+    ("network", "tensors"), dict
+)
 _WORDS = {str: "text", dict: "mapping"}
 # What a policy network at most is; those of the package have 100,000 bytes in 3 layers, 128 wide
 WIDEST, DEEPEST, LARGEST = 4096, 32, 50_000_000

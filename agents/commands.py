@@ -153,13 +153,18 @@ class Failures:
         """Fly, write everything to the folder, report and return the exit code."""
         from agents.agent import PRETRAINED, shipped_agents
         from agents.failures.report import write_failure_report
+        from hydrone_gym.evaluation.tables import print_tables
 
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
         behind = "+shield" if self.shield else ""
         folder = f"={PRETRAINED / self.agent}{behind}" if self.agent in shipped_agents() else ""
-        text, document = write_failure_report(
+        tables, document = write_failure_report(
             f"{self.agent}{behind}{folder}", self.out, worlds=self.episodes, options=options, progress=not self.json
         )
-        print(json.dumps(document) if self.json else text)
+        if self.json:
+            print(json.dumps(document))
+        else:
+            print_tables(tables)
+            print(self.out)
         return 0

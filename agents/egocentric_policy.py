@@ -112,7 +112,9 @@ def _predicting(model: Any) -> Callable[[NDArray[np.float32], Any, bool], _Rows]
     def choose(rows: NDArray[np.float32], held: Any, deterministic: bool) -> _Rows:
         rows, told = rows if scale is None else scale.normalize_obs(rows), []
         for row, own in zip(rows, held or [None] * len(rows)):
-            told.append(model.predict(row, state=own, episode_start=np.array([own is None]), deterministic=deterministic))
+            told.append(
+                model.predict(row, state=own, episode_start=np.array([own is None]), deterministic=deterministic)
+            )
         actions, states = zip(*told)
         return np.array(actions), None if states[0] is None else states
 

@@ -31,7 +31,12 @@ def _number(words: str, low: float = -math.inf, high: float = math.inf, *, prefi
                 value = float(value.removeprefix(prefix))
             except ValueError:
                 return False
-        return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high and abs(value) < 1e300
+        return (
+            isinstance(value, int | float)
+            and not isinstance(value, bool)
+            and low <= value <= high
+            and abs(value) < 1e300
+        )
 
     return _Rule(words, holds)
 
@@ -51,7 +56,7 @@ _SIZE = _whole(1, 10**9)
 def _layers(value: Any) -> bool:
     """Sizes of hidden layers, or two lists of them: of the policy and of what judges it."""
     if isinstance(value, dict):
-        return len(value) == 2 and "pi" in value and all(isinstance(v, list) and _layers(v) for v in value.values())
+        return len(value) == 2 and all(isinstance(v, list) and _layers(v) for v in value.values())
     sizes = isinstance(value, list) and all(type(size) is int and 1 <= size <= WIDEST for size in value)
     return sizes and 1 <= len(value) < DEEPEST
 
@@ -77,7 +82,7 @@ ALGORITHM = {
 }
 POLICY = {
     "net_arch": _Rule(
-        f"a list of fewer than {DEEPEST} sizes from 1 to {WIDEST}, or two, pi and vf (PPO) or qf", _layers
+        f"a list of fewer than {DEEPEST} sizes from 1 to {WIDEST}, or a mapping of two such lists", _layers
     ),
     "log_std_init": _number("a number", -20.0, 20.0),
     "optimizer_kwargs": _Rule("a mapping, code is not run", lambda value: isinstance(value, dict)),
@@ -111,6 +116,9 @@ def check_entries(file: Path, content: Mapping[Any, Any], entry: str, algorithm:
     _check(file, "", settings, ALGORITHM, ALGORITHM.keys() & taken)
     policy = inspect.signature(algorithm.model.policy_aliases["MlpPolicy"]).parameters
     _check(file, "policy_kwargs.", settings.get("policy_kwargs", {}), POLICY, POLICY.keys() & policy)
+    arch, judge = settings.get("policy_kwargs", {}).get("net_arch"), "qf" if noise <= taken else "vf"
+    if isinstance(arch, dict) and arch.keys() != {"pi", judge}:
+        raise ValueError(f"{file}: policy_kwargs.net_arch must name pi and {judge}, got {reprlib.repr(arch)}")
     if settings["n_timesteps"] != int(settings["n_timesteps"]):
         raise ValueError(f"{file}: n_timesteps must be {_whole(1).words}, got {settings['n_timesteps']!r}")
     missions = content.get("missions")

@@ -36,6 +36,7 @@ class RunLog(BaseCallback):
         super().__init__()
         self.folder = folder
         self._total, self._every, self._progress, self._spent = total, every, progress, spent
+        self._bar: tqdm | None = None
         self.spent = spent  # the same at the latest checkpoint
         self._ended: list[tuple[int, float, int]] = []  # outcome, return, periods since the last line
 
@@ -98,7 +99,11 @@ class RunLog(BaseCallback):
         if self.num_timesteps > self._written_at:
             self._write_line()
         self.checkpoint()
-        self._bar.close()
+
+    def close(self) -> None:
+        """End the line of the bar, however the training ended."""
+        if self._bar is not None:
+            self._bar.close()
 
 
 def _whole_rollouts(model: BaseAlgorithm, steps: int) -> int:

@@ -177,7 +177,8 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
     left = recipe.steps - model.num_timesteps
     if left > 0:
         interval = ALGORITHMS[run.algorithm].log_interval
-        model.learn(left, callback=log, log_interval=interval, reset_num_timesteps=model.num_timesteps == 0)
+        with contextlib.closing(log):
+            model.learn(left, callback=log, log_interval=interval, reset_num_timesteps=model.num_timesteps == 0)
     draw_curve(run.folder)
     folder, episodes = run.folder / "agent", run.evaluation_episodes
     seconds = {name: round(value, 2) for name, value in zip(("wall", "cpu"), log.spent, strict=True)}

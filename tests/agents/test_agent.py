@@ -138,7 +138,10 @@ def test_pickled_arrays_are_refused(folder):
         ({"environment": "CartPole-v1"}, "not registered here"),
         ({"observation": "0"}, "another layout"),
         ({"network": {"sizes": [68, 3], "activation": "tanh", "output": "linear"}}, "were noted"),
-        ({"network": {"sizes": [68, 64, 64, 3], "activation": "gelu", "output": "linear"}}, "unknown activation 'gelu'"),
+        (
+            {"network": {"sizes": [68, 64, 64, 3], "activation": "gelu", "output": "linear"}},
+            "unknown activation 'gelu'",
+        ),
         ({"tensors": {"file": "other.npz", "sha256": ""}}, "other.npz are missing"),
         ({"tensors": 3}, '"tensors" must be a mapping, got 3'),
     ],

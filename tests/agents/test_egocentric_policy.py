@@ -37,9 +37,9 @@ def made(kind, **policy):
 
 def module(dtype=torch.float32):
     torch.manual_seed(0)
-    return torch.nn.Sequential(torch.nn.Linear(68, 8), torch.nn.Dropout(0.5), torch.nn.Linear(8, 3), torch.nn.Tanh()).to(
-        dtype
-    )
+    return torch.nn.Sequential(
+        torch.nn.Linear(68, 8), torch.nn.Dropout(0.5), torch.nn.Linear(8, 3), torch.nn.Tanh()
+    ).to(dtype)
 
 
 def both_ways(policy, choose, **options):
@@ -148,13 +148,18 @@ CHOSEN = r"Box\(-1.0, 1.0, \(3,\), float32\)"
 
 
 def test_models_that_do_not_fit():
-    with pytest.raises(ValueError, match=rf"^PPO was trained on observations Dict\('goal.* … and actions Box\(.*; the egocentric .* {SEEN} and actions {CHOSEN}$"):
+    with pytest.raises(
+        ValueError,
+        match=rf"^PPO was trained on observations Dict\('goal.* … and actions Box\(.*; the egocentric .* {SEEN} and actions {CHOSEN}$",
+    ):
         EgocentricPolicy(PPO("MultiInputPolicy", gym.make(ID), device="cpu"))
     with pytest.raises(ValueError, match=rf"^PPO was trained on observations Box\(.*\(4,\).* {SEEN} and .* {CHOSEN}"):
         EgocentricPolicy(PPO("MlpPolicy", "CartPole-v1", device="cpu"))
     with pytest.raises(ValueError, match=r"^QRDQN .* actions Discrete\(2\); .*discrete actions cannot choose a refer"):
         EgocentricPolicy(QRDQN("MlpPolicy", "CartPole-v1", device="cpu", buffer_size=10))
-    with pytest.raises(ValueError, match=rf"^Linear refuses observations \(1, 68\): RuntimeError: .*{SEEN} and.*{CHOSEN}"):
+    with pytest.raises(
+        ValueError, match=rf"^Linear refuses observations \(1, 68\): RuntimeError: .*{SEEN} and.*{CHOSEN}"
+    ):
         EgocentricPolicy(torch.nn.Linear(67, 3))
     with pytest.raises(ValueError, match=r"^Linear turns observations \(1, 68\) into \(1, 4\), not \(1, 3\); the egoc"):
         EgocentricPolicy(torch.nn.Linear(68, 4))
