@@ -128,7 +128,7 @@ def _network(described: dict[str, Any], tensors: dict[str, Any], folder: Path) -
     if hashlib.sha256(data).hexdigest() != tensors.get("sha256"):
         raise ValueError(f"{file.name} is damaged or another one: its SHA-256 differs from the one noted")
     layers = range(len(sizes) - 1)
-    shapes = {f"weight_{k}.npy": (sizes[k], sizes[k + 1]) for k in layers}
+    shapes: dict[str, tuple[int, ...]] = {f"weight_{k}.npy": (sizes[k], sizes[k + 1]) for k in layers}
     shapes |= {f"bias_{k}.npy": (sizes[k + 1],) for k in layers}
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -172,7 +172,7 @@ def _tensor(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> NDAr
         raise ValueError(f"{name} is of another format")
     found, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
     numbers = stream.read()
-    if (found, dtype, len(numbers)) != (shape, np.float32, size):
+    if (found, dtype, len(numbers)) != (shape, np.dtype(np.float32), size):
         raise ValueError(f"{name} must be float32 {shape}, got {dtype} {found} in {len(numbers)} bytes")
     array = np.frombuffer(numbers, np.float32).reshape(shape, order="F" if fortran else "C")
     return np.array(array, order="C")

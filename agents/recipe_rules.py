@@ -61,6 +61,13 @@ def _layers(value: Any) -> bool:
     return sizes and 1 <= len(value) < DEEPEST
 
 
+def _missions(value: Any) -> bool:
+    return isinstance(value, dict) and all(
+        isinstance(name, str) and name.startswith("HydroneGym/") and name in registry and type(rows) is int and rows > 0
+        for name, rows in value.items()
+    )
+
+
 ALGORITHM = {
     "n_envs": _whole(1, 1_000_000),
     "n_timesteps": _number("a whole number of at least 1", 1.0, 1e15),
@@ -92,31 +99,25 @@ POLICY = {
     **dict.fromkeys(("ortho_init", "full_std", "use_expln", "share_features_extractor"), _YES),
 }
 TOP = {
-    "missions": _Rule("a mapping from ids of this project to rows, at least 1 each", lambda value: _missions(value)),
+    "missions": _Rule("a mapping from ids of this project to rows, at least 1 each", _missions),
     "environment": _Rule("a mapping of keyword options", lambda value: isinstance(value, dict)),
     "shield": _YES,
 }
 
 
-def _missions(value: Any) -> bool:
-    return isinstance(value, dict) and all(
-        isinstance(name, str) and name.startswith("HydroneGym/") and name in registry and type(rows) is int and rows > 0
-        for name, rows in value.items()
-    )
-
-
 def check_entries(file: Path, content: Mapping[Any, Any], entry: str, algorithm: Algorithm) -> None:
     """Check a recipe, whose hyper-parameters are at `entry`; ValueError names the file, the key, rule and value."""
-    settings, noise = content[entry], {"noise_type", "noise_std"}
-    taken = inspect.signature(algorithm.model).parameters.keys() | {"n_envs", "n_timesteps"}
-    taken |= noise if "action_noise" in taken else set()
+    settings, taken = content[entry], inspect.signature(algorithm.model).parameters.keys() | {"n_envs", "n_timesteps"}
+    off_policy = "action_noise" in taken
+    taken |= {"noise_type", "noise_std"} if off_policy else set()
     _check(file, "", content, TOP, TOP.keys() | {entry})
     if missing := [name for name in ("n_envs", "n_timesteps", "policy") if name not in settings]:
         raise ValueError(f"{file}: {entry} lacks {', '.join(missing)}")
-    _check(file, "", settings, ALGORITHM, ALGORITHM.keys() & taken)
+    rules = ALGORITHM if off_policy else {**ALGORITHM, "ent_coef": _POSITIVE}
+    _check(file, "", settings, rules, rules.keys() & taken)
     policy = inspect.signature(algorithm.model.policy_aliases["MlpPolicy"]).parameters
     _check(file, "policy_kwargs.", settings.get("policy_kwargs", {}), POLICY, POLICY.keys() & policy)
-    arch, judge = settings.get("policy_kwargs", {}).get("net_arch"), "qf" if noise <= taken else "vf"
+    arch, judge = settings.get("policy_kwargs", {}).get("net_arch"), "qf" if off_policy else "vf"
     if isinstance(arch, dict) and arch.keys() != {"pi", judge}:
         raise ValueError(f"{file}: policy_kwargs.net_arch must name pi and {judge}, got {reprlib.repr(arch)}")
     if settings["n_timesteps"] != int(settings["n_timesteps"]):

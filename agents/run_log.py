@@ -25,8 +25,9 @@ LINES = 500  # of a curve at most; a rollout that is longer than its share of th
 class RunLog(BaseCallback):
     """Writes `curve.csv` and checkpoints into a run folder, and shows a bar.
 
-    `total` is the number of steps asked for, and the bar counts to those that whole rollouts make of it; `every` is the least number of steps between checkpoints, `spent` the wall-clock
-    and processor seconds used before this process took over.
+    `total` is the number of steps asked for; the bar counts to those that whole rollouts make of it. `every` is the
+    least number of steps between checkpoints, `spent` the wall-clock and processor seconds used before this process
+    took over.
     """
 
     def __init__(
@@ -36,7 +37,7 @@ class RunLog(BaseCallback):
         super().__init__()
         self.folder = folder
         self._total, self._every, self._progress, self._spent = total, every, progress, spent
-        self._bar: tqdm | None = None
+        self._bar = tqdm(disable=True)
         self.spent = spent  # the same at the latest checkpoint
         self._ended: list[tuple[int, float, int]] = []  # outcome, return, periods since the last line
 
@@ -102,8 +103,7 @@ class RunLog(BaseCallback):
 
     def close(self) -> None:
         """End the line of the bar, however the training ended."""
-        if self._bar is not None:
-            self._bar.close()
+        self._bar.close()
 
 
 def _whole_rollouts(model: BaseAlgorithm, steps: int) -> int:

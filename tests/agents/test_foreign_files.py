@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import itertools
 import os
 import shutil
 import subprocess
@@ -22,7 +23,7 @@ SIZES = [68, 256, 256, 3]
 
 
 def network(**changes):
-    pairs = list(zip(SIZES, SIZES[1:]))
+    pairs = list(itertools.pairwise(SIZES))
     layers = {
         "weights": tuple(np.zeros(pair, np.float32) for pair in pairs),
         "biases": tuple(np.zeros(width, np.float32) for _, width in pairs),
@@ -114,7 +115,7 @@ BOMBS = {
     big: "weight_0.npy would unpack to 120000000 bytes, its shape (68, 256) says 69632",
     big_and_said_to_be_small: "tensors.npz does not hold the layers of a network: ",
     packed_otherwise: "weight_0.npy would unpack to",
-    a_shape_that_no_memory_holds: "weight_0.npy must be float32 (68, 256), got float32 (99999999, 99999) in 69632 bytes",
+    a_shape_that_no_memory_holds: "weight_0.npy must be float32 (68, 256), got float32 (99999999, 99999) in",
     many_members: "layers of sizes [68, 256, 256, 3] were noted, members are",
     sizes_that_no_memory_holds: "more than 50000000",
     an_alias_bomb: "line 2: an alias",
@@ -255,9 +256,9 @@ def test_plain_data_comes_back(tmp_path):
 
 
 def test_what_cannot_be_read_again_is_not_made():
+    wide = network(
+        weights=(np.zeros((68, 5000), np.float32), np.zeros((5000, 3), np.float32)),
+        biases=(np.zeros(5000, np.float32), np.zeros(3, np.float32)),
+    )
     with pytest.raises(ValueError, match="sizes must be whole numbers from 1 to 4096"):
-        wide = network(
-            weights=(np.zeros((68, 5000), np.float32), np.zeros((5000, 3), np.float32)),
-            biases=(np.zeros(5000, np.float32), np.zeros(3, np.float32)),
-        )
         AgentFile(name="wide", algorithm="PPO", environment=ID, network=wide)

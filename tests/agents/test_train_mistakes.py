@@ -64,6 +64,7 @@ RECIPES_THAT_ARE_REFUSED = {
         "unknown key mission: known are HydroneGym/Mission-v0, environment",
     ),
     "not a name": ({**SMALL, 3: {}}, "unknown key 3: known are"),
+    "entropy": (entry(ent_coef="auto"), "ent_coef must be a number of at least 0, got 'auto'"),
     "type": (entry(n_steps="8"), "n_steps must be a whole number from 1 to 1,000,000,000, got '8'"),
     "bool": (entry(n_epochs=True), "n_epochs must be a whole number"),
     "half a step": (entry(n_timesteps=10.5), "n_timesteps must be a whole number"),
@@ -117,6 +118,12 @@ def test_values_that_a_recipe_may_have(here):
         training._built(
             TrainingRun(folder=here / "x", algorithm=name, recipe=recipe), training.load_recipe(name, recipe)
         )
+
+
+def test_noise_is_normal(here):
+    recipe = written(here / "td3.yml", {**RECIPES["td3"], ENV_ID: {**RECIPES["td3"][ENV_ID], "noise_type": "ou"}})
+    with pytest.raises(ValueError, match="noise_type must be normal, got 'ou'"):
+        training.load_recipe("td3", recipe)
 
 
 ARGUMENTS = {
@@ -173,7 +180,7 @@ def test_the_bar_ends_where_the_training_does(here, monkeypatch, algorithm, step
     train(small_run(here / OUT, recipe, algorithm=algorithm, steps=steps, progress=True))
     taken = read_agent(here / OUT / "agent").notes["steps"]
     assert taken >= steps
-    assert (bars[0].total, bars[0].n) == (taken, taken)
+    assert (bars[-1].total, bars[-1].n) == (taken, taken)
 
 
 def test_the_second_of_two_is_told(here, capsys):

@@ -222,7 +222,7 @@ def test_bad_runs(tmp_path, recipe):
         ),
         (
             "HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: MlpPolicy, noise_type: ou}",
-            "must be normal, got 'ou'",
+            "unknown key noise_type: known are",
         ),
         (
             "HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: MlpPolicy}\n"
