@@ -5,5 +5,6 @@ other way. Flying a trained agent, `load_agent`, needs neither torch nor Stable-
 """
 
 from agents.agent import Agent, load_agent, shipped_agents
+from agents.egocentric_policy import EgocentricPolicy
 
-__all__ = ["Agent", "load_agent", "shipped_agents"]
+__all__ = ["Agent", "EgocentricPolicy", "load_agent", "shipped_agents"]

@@ -1,14 +1,18 @@
 """Checkpoints: everything a training needs to go on as if it had never stopped, bit for bit.
 
 A checkpoint is taken between an update and the next rollout, in a folder of its own that appears under its name only
-once it is complete: a run killed at any moment leaves a usable one. It is for going on with your own runs: unlike an
+once it is complete: a run killed at any moment leaves a usable one. It holds the SHA-256 of its files, so one that was
+damaged later is told from a whole one, and the one before it is used. It is for going on with your own runs: unlike an
 agent's files it holds pickles, so do not open one that somebody else gave you.
 """
 
+import hashlib
+import json
 import os
 import pickle
 import random
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +26,13 @@ KEPT = 2  # latest checkpoints of a run; one if they hold a replay buffer, which
 MODEL = "model.zip"
 _REST = "rest.pkl"
 _BUFFER = "replay.npz"
+_SUMS = "sha256.json"
 _PLAIN = ("observations", "actions", "rewards", "dones", "timeouts")  # what is written of a buffer as it is
 
 
 def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -> Path:
     """Write a checkpoint into a folder of them, replay buffer included, and delete old ones; return its path."""
     final = folder / f"step_{model.num_timesteps:010d}"
-    if final.exists():
-        return final
     unfinished = folder / "unfinished"
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.mkdir(parents=True)
@@ -46,16 +49,45 @@ def save_checkpoint(model: BaseAlgorithm, folder: Path, extra: dict[str, Any]) -
     }
     with (unfinished / _REST).open("wb") as stream:
         pickle.dump(rest, stream)
+    (unfinished / _SUMS).write_text(json.dumps(_sums(unfinished)), encoding="utf-8")
+    shutil.rmtree(final, ignore_errors=True)
     os.replace(unfinished, final)
     kept = 1 if (final / _BUFFER).exists() else KEPT
-    for old in checkpoints(folder)[:-kept]:
-        shutil.rmtree(old)
+    saved = checkpoints(folder)
+    here = saved.index(final) + 1  # those beyond it were found damaged, and the run went on from one before them
+    for other in saved[: max(here - kept, 0)] + saved[here:]:
+        shutil.rmtree(other)
     return final
 
 
 def checkpoints(folder: Path) -> list[Path]:
-    """Return the complete checkpoints of a folder, oldest first."""
+    """Return the checkpoints of a folder, oldest first."""
     return sorted(path for path in folder.glob("step_*") if path.is_dir())
+
+
+def latest_checkpoint(folder: Path) -> Path:
+    """Return the latest checkpoint whose files are those that were written; say on stderr which are not.
+
+    Raises FileNotFoundError if there is none.
+    """
+    for path in reversed(checkpoints(folder)):
+        try:
+            if json.loads((path / _SUMS).read_text(encoding="utf-8")) == _sums(path):
+                return path
+        except (OSError, ValueError):
+            pass
+        print(f"hydrone: {path} is damaged: the checkpoint before it is tried", file=sys.stderr)
+    raise FileNotFoundError(f"{folder.parent} holds no checkpoint that is whole")
+
+
+def _sums(path: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file of a checkpoint."""
+    sums = {}
+    for file in sorted(path.iterdir()):
+        if file.name != _SUMS:
+            with file.open("rb") as stream:
+                sums[file.name] = hashlib.file_digest(stream, "sha256").hexdigest()
+    return sums
 
 
 def load_checkpoint(path: Path, algorithm: type[BaseAlgorithm]) -> tuple[BaseAlgorithm, dict[str, Any]]:

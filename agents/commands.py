@@ -1,16 +1,20 @@
 """The subcommands of `hydrone` about agents; importing this needs none of what they need."""
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 import tyro
 
 from hydrone_gym.cli import check_obstacles
-from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.suites import MISSIONS
 
+if TYPE_CHECKING:
+    from agents.training import Flown
+
+INTERRUPTED = 130  # what shells give for Ctrl-C
 _Mission = Literal["mission", "air-to-water", "water-to-air"]
 _IDS = dict(zip(get_args(_Mission), MISSIONS, strict=True))
 _Vehicle = Literal["paper", "physical"]
@@ -43,17 +47,17 @@ class Train:
 
     def run(self) -> int:
         """Train, report and return the exit code."""
-        from agents.training import resume
         from hydrone_gym.evaluation.summary import summarise
         from hydrone_gym.evaluation.tables import print_tables, tables_of
 
-        if self.resume is None:
-            folder, records, scores = self._trained()
-        else:
-            given = [name for name in self._TRAINED if getattr(self, name) != getattr(Train, name)]
-            if given:
-                raise ValueError(f"--resume excludes {', '.join(given)}: the run folder says what is trained")
-            folder, (records, scores) = self.resume, resume(self.resume, progress=not self.json)
+        folder = self.resume or self.out or Path("runs") / f"{self.algorithm}-{self.seed}"
+        try:
+            records, scores = self._trained(folder) if self.resume is None else self._resumed(folder)
+        except KeyboardInterrupt:
+            kept = sorted(path.name for path in folder.glob("checkpoints/step_*"))
+            on = f"hydrone train --resume {folder} goes on after {kept[-1]}" if kept else "nothing is kept"
+            print(f"hydrone: interrupted; {on.replace('step_', 'step ')}", file=sys.stderr)
+            return INTERRUPTED
         if self.json:
             print(json.dumps({"folder": str(folder), "scores": scores}))
             return 0
@@ -62,23 +66,32 @@ class Train:
         print(folder)
         return 0
 
-    def _trained(self) -> tuple[Path, list[Record], list[dict[str, Any]]]:
-        """Train a new run; return its folder and how the agent flew."""
+    def _resumed(self, folder: Path) -> "Flown":
+        """Go on with a run; return how the agent flew."""
+        from agents.training import resume
+
+        if given := [name for name in self._TRAINED if getattr(self, name) != getattr(Train, name)]:
+            raise ValueError(f"--resume excludes {', '.join(given)}: the run folder says what is trained")
+        return resume(folder, progress=not self.json)
+
+    def _trained(self, folder: Path) -> "Flown":
+        """Train a new run; return how the agent flew."""
         from agents.training import TrainingRun, train
 
         if self.algorithm == "ppo_shielded" and self.start_from is None:
             raise ValueError("ppo_shielded goes on with weights trained without the shield: name their --start-from")
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "vehicle": self.vehicle}
-        run = TrainingRun(
-            folder=Path("runs") / f"{self.algorithm}-{self.seed}" if self.out is None else self.out,
-            options={name: value for name, value in options.items() if value is not None},
-            threads=self.num_threads,
-            progress=not self.json,
-            **{name: getattr(self, name) for name in ("algorithm", "seed", "steps", "recipe", "start_from")},
-            **{name: getattr(self, name) for name in ("checkpoint_every", "evaluation_episodes", "tensorboard")},
+        return train(
+            TrainingRun(
+                folder=folder,
+                options={name: value for name, value in options.items() if value is not None},
+                threads=self.num_threads,
+                progress=not self.json,
+                **{name: getattr(self, name) for name in ("algorithm", "seed", "steps", "recipe", "start_from")},
+                **{name: getattr(self, name) for name in ("checkpoint_every", "evaluation_episodes", "tensorboard")},
+            )
         )
-        return run.folder, *train(run)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,13 +153,18 @@ class Failures:
         """Fly, write everything to the folder, report and return the exit code."""
         from agents.agent import PRETRAINED, shipped_agents
         from agents.failures.report import write_failure_report
+        from hydrone_gym.evaluation.tables import print_tables
 
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
         behind = "+shield" if self.shield else ""
         folder = f"={PRETRAINED / self.agent}{behind}" if self.agent in shipped_agents() else ""
-        text, document = write_failure_report(
+        tables, document = write_failure_report(
             f"{self.agent}{behind}{folder}", self.out, worlds=self.episodes, options=options, progress=not self.json
         )
-        print(json.dumps(document) if self.json else text)
+        if self.json:
+            print(json.dumps(document))
+        else:
+            print_tables(tables)
+            print(self.out)
         return 0

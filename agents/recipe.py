@@ -10,11 +10,12 @@ from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.utils import LinearSchedule
 
 from agents.agent import ACTIONS
-from agents.agent_file import read_yaml
+from agents.algorithms import ALGORITHMS
+from agents.plain_data import read_yaml
+from agents.recipe_rules import LINEAR, check_entries
 
 FOLDER = Path(__file__).parent / "hyperparameters"
 ENV_ID = "HydroneGym/Mission-v0"
-LINEAR = "lin_"  # prefix of a value, "lin_5e-4", that falls linearly to zero over the training
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +50,7 @@ class Recipe:
 def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     """Read the recipe of an algorithm, from the package or from a file of the user.
 
-    Raises ValueError for an unknown algorithm, or for a file that is no recipe, naming it and what is wrong.
+    Raises ValueError for an unknown algorithm, or for a file that is no recipe, naming it, the key and its rule.
     """
     known = sorted(file.stem for file in FOLDER.glob("*.yml"))
     if algorithm not in known:
@@ -58,28 +59,15 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
     content = read_yaml(file)
     if not isinstance(content, dict) or not isinstance(content.get(ENV_ID), dict):
         raise ValueError(f"{file}: needs an entry {ENV_ID!r} with the hyper-parameters")
+    check_entries(file, content, ENV_ID, ALGORITHMS[algorithm])
     settings = dict(content[ENV_ID])
-    missing = [name for name in ("n_envs", "n_timesteps", "policy") if name not in settings]
-    if missing:
-        raise ValueError(f"{file}: {ENV_ID} lacks {', '.join(missing)}")
-    count, steps, policy = settings.pop("n_envs"), settings.pop("n_timesteps"), settings.pop("policy")
-    kwargs, noise = settings.get("policy_kwargs", {}), settings.get("noise_type")
-    missions, environment = content.get("missions", {ENV_ID: count}), content.get("environment", {})
-    rows = sum(missions.values()) if isinstance(missions, dict) else None
-    for fits, rule, got in (
-        (isinstance(kwargs, dict), "policy_kwargs must be a mapping, code is not run", kwargs),
-        (noise in (None, "normal"), "noise_type must be 'normal'", noise),
-        (rows == count, f"the rows of missions must sum to n_envs = {count}", missions),
-        (isinstance(environment, dict), "environment must be a mapping of keyword options", environment),
-    ):
-        if not fits:
-            raise ValueError(f"{file}: {rule}, got {got!r}")
+    count, steps, policy = settings.pop("n_envs"), int(settings.pop("n_timesteps")), settings.pop("policy")
     return Recipe(
         algorithm=algorithm,
-        steps=int(steps),
-        missions=missions,
+        steps=steps,
+        missions=content.get("missions", {ENV_ID: count}),
         policy=policy,
         settings=settings,
-        shield=bool(content.get("shield", False)),
-        environment=environment,
+        shield=content.get("shield", False),
+        environment=content.get("environment", {}),
     )

@@ -5,7 +5,9 @@ import time
 from pathlib import Path
 
 import numpy as np
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from tqdm import tqdm
 
 from agents.checkpoint import save_checkpoint
@@ -23,8 +25,9 @@ LINES = 500  # of a curve at most; a rollout that is longer than its share of th
 class RunLog(BaseCallback):
     """Writes `curve.csv` and checkpoints into a run folder, and shows a bar.
 
-    The bar counts to `total` steps; `every` is the least number of steps between checkpoints, `spent` the wall-clock
-    and processor seconds used before this process took over.
+    `total` is the number of steps asked for; the bar counts to those that whole rollouts make of it. `every` is the
+    least number of steps between checkpoints, `spent` the wall-clock and processor seconds used before this process
+    took over.
     """
 
     def __init__(
@@ -34,6 +37,8 @@ class RunLog(BaseCallback):
         super().__init__()
         self.folder = folder
         self._total, self._every, self._progress, self._spent = total, every, progress, spent
+        self._bar = tqdm(disable=True)
+        self.spent = spent  # the same at the latest checkpoint
         self._ended: list[tuple[int, float, int]] = []  # outcome, return, periods since the last line
 
     def _seconds(self) -> tuple[float, float]:
@@ -44,7 +49,7 @@ class RunLog(BaseCallback):
         self._began = (time.perf_counter(), time.process_time())
         self._saved_at, self._written_at = self.num_timesteps or -self._every, self.num_timesteps
         shown = {"unit": "step", "unit_scale": True, "disable": not self._progress}
-        self._bar = tqdm(total=self._total, initial=self.num_timesteps, **shown)
+        self._bar = tqdm(total=_whole_rollouts(self.model, self._total), initial=self.num_timesteps, **shown)
         lines: list[list[str]] = []
         if (self.folder / CURVE).exists():  # lines later than the checkpoint that the training goes on from are dropped
             with (self.folder / CURVE).open(newline="", encoding="utf-8") as stream:
@@ -62,7 +67,8 @@ class RunLog(BaseCallback):
 
     def checkpoint(self) -> None:
         """Save a checkpoint now."""
-        save_checkpoint(self.model, self.folder / CHECKPOINTS, {"spent": self._seconds()})
+        self.spent = self._seconds()
+        save_checkpoint(self.model, self.folder / CHECKPOINTS, {"spent": self.spent})
         self._saved_at = self.num_timesteps
 
     def _on_step(self) -> bool:
@@ -94,7 +100,17 @@ class RunLog(BaseCallback):
         if self.num_timesteps > self._written_at:
             self._write_line()
         self.checkpoint()
+
+    def close(self) -> None:
+        """End the line of the bar, however the training ended."""
         self._bar.close()
+
+
+def _whole_rollouts(model: BaseAlgorithm, steps: int) -> int:
+    """Return how many steps a model takes when asked for some: rollouts are not cut short."""
+    periods = model.n_steps if isinstance(model, OnPolicyAlgorithm) else model.train_freq.frequency
+    rollout = model.n_envs * periods
+    return -(-steps // rollout) * rollout
 
 
 def draw_curve(folder: Path) -> Path:

@@ -15,9 +15,10 @@ from agents.failures.worlds import features_of
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run import carry_out
+from hydrone_gym.evaluation.run_folder import write_whole
 from hydrone_gym.evaluation.suites import HELD_OUT, MISSIONS, Suite
 from hydrone_gym.evaluation.summary import scores_of, summarise
-from hydrone_gym.evaluation.tables import markdown, tables_of
+from hydrone_gym.evaluation.tables import Table, markdown, tables_of
 from hydrone_gym.rendering.style import DOTS_PER_INCH
 
 
@@ -43,7 +44,7 @@ def find_failures(plan: Plan, *, progress: bool = False) -> tuple[list[Record], 
 
 def write_failure_report(
     policy: str, folder: Path, *, worlds: int, options: Mapping[str, Any], progress: bool = False
-) -> tuple[str, dict[str, Any]]:
+) -> tuple[list[Table], dict[str, Any]]:
     """Fly held-out worlds and write tables, `failures.csv` and figures; return the tables and the same as plain data.
 
     Arguments are those of `evaluate_held_out`; the folder is made if missing. Raises what `find_failures` and
@@ -64,7 +65,7 @@ def write_failure_report(
         figure.savefig(folder / f"failures-{name}.png", dpi=DOTS_PER_INCH)
     write_failures(failures, folder / "failures.csv")
     outcomes = [table for table in tables_of(summarise(records)) if table.title.endswith("outcomes")]
-    text = f"{markdown(outcomes)}\n{failure_tables(failures, MISSIONS, worlds)}"
-    (folder / "failures.md").write_text(text + "\n", encoding="utf-8")
+    tables = [*outcomes, *failure_tables(failures, MISSIONS, worlds)]
+    write_whole(folder / "failures.md", markdown(tables))
     told = [{"mission": f.mission, "seed": f.seed, "outcome": f.outcome.name, "cause": f.cause} for f in failures]
-    return text, {"folder": str(folder), "scores": scores_of(records), "failures": told}
+    return tables, {"folder": str(folder), "scores": scores_of(records), "failures": told}

@@ -1,4 +1,4 @@
-"""Failures as a CSV file, a line a flight, and as Markdown tables."""
+"""Failures as a CSV file, a line a flight, and as tables."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from agents.failures.causes import CAUSES, PARTS, Chance, Contact, End, Failure
+from hydrone_gym.evaluation.tables import Table
 
 # Units are part of the names; docs/failures.md says what each column means.
 _FOUND = (*End._fields, *Contact._fields, *Chance._fields)
@@ -29,16 +30,16 @@ def _line(failure: Failure) -> list[object]:
     return [round(cell, 4) if isinstance(cell, float) else cell for cell in cells]
 
 
-def failure_tables(failures: Sequence[Failure], missions: Sequence[str], worlds: int) -> str:
-    """Return Markdown tables: causes and parts of the flight by mission, and the typical numbers of each cause.
+def failure_tables(failures: Sequence[Failure], missions: Sequence[str], worlds: int) -> list[Table]:
+    """Return tables: causes and parts of the flight by mission, and the typical numbers of each cause.
 
     `missions` are the environment ids in the order of the columns, `worlds` how many were flown in each.
     """
-    parts = [_counts("cause", CAUSES, lambda failure: failure.cause, failures, missions, worlds)]
+    tables = [_counts("cause", CAUSES, lambda failure: failure.cause, failures, missions, worlds)]
     if failures:
-        parts.append(_counts("where", PARTS, lambda failure: failure.end.part, failures, missions, worlds))
-        parts.append(_typical(failures))
-    return "\n\n".join(parts)
+        tables.append(_counts("where", PARTS, lambda failure: failure.end.part, failures, missions, worlds))
+        tables.append(_typical(failures))
+    return tables
 
 
 def _counts(
@@ -48,19 +49,19 @@ def _counts(
     failures: Sequence[Failure],
     missions: Sequence[str],
     worlds: int,
-) -> str:
+) -> Table:
     """Count failures of each kind in each mission, with their share of the mission's failures."""
     columns = [[kind_of(failure) for failure in failures if failure.mission == mission] for mission in missions]
     rows = [(kind, *(_share(column.count(kind), len(column)) for column in columns)) for kind in kinds]
     rows = [row for row in rows if any(cell != "0" for cell in row[1:])]
     totals = (f"{len(column)} of {worlds} ({100.0 * len(column) / worlds:.2f} %)" for column in columns)
-    return _table((title, *map(short_name, missions)), [*rows, ("failures of worlds", *totals)])
+    return Table(title.capitalize(), (title, *map(short_name, missions)), (*rows, ("failures of worlds", *totals)))
 
 
-def _typical(failures: Sequence[Failure]) -> str:
+def _typical(failures: Sequence[Failure]) -> Table:
     """Return the medians of what led to each cause, over all missions."""
-    speeds = ("horizontal m/s", "vertical m/s", "closing m/s")
-    heads = ("flights", *speeds, "known s", "last chance s", "speed then m/s", "stayed s")
+    speeds = ("horizontal\nm/s", "vertical\nm/s", "closing\nm/s")
+    heads = ("flights", *speeds, "known\ns", "last\nchance s", "speed\nthen m/s", "stayed\ns")
     rows = []
     for cause in CAUSES:
         those = [failure for failure in failures if failure.cause == cause]
@@ -77,7 +78,7 @@ def _typical(failures: Sequence[Failure]) -> str:
         )
         if those:
             rows.append((cause, str(len(those)), *map(_median, values)))
-    return _table(("medians", *heads), rows)
+    return Table("Medians", ("medians", *heads), tuple(rows))
 
 
 def _median(values: Sequence[float]) -> str:
@@ -91,8 +92,3 @@ def _share(count: int, whole: int) -> str:
 def short_name(mission: str) -> str:
     """Return an environment id without namespace and version."""
     return mission.removeprefix("HydroneGym/").removesuffix("-v0")
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = (heads, ("---", *["---:"] * (len(heads) - 1)), *rows)
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

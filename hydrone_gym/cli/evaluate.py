@@ -14,9 +14,10 @@ from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
 from hydrone_gym.evaluation.run import carry_out
-from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, RunFolder, write_results
+from hydrone_gym.evaluation.run_folder import LATEX, ROWS, SUMMARY, TABLES, RunFolder, write_results
 from hydrone_gym.evaluation.shown import Writer
 from hydrone_gym.evaluation.tables import print_tables
+from hydrone_gym.rendering.files import Width, inches
 from hydrone_gym.rendering.replay import load_viser, write_replay
 
 INTERRUPTED = 130  # what shells give for Ctrl-C
@@ -40,15 +41,21 @@ class Evaluate:
     jobs: int | None = None  # Flights at once, as many as there are cores unless given.
     backend: str = "loky"  # Backend of joblib: loky, threading, dask, ray.
     out: Path | None = None
-    """Folder for rows.csv, summary.json and tables.md, evaluations/<suites> unless given; made if missing."""
+    """Folder for rows.csv, summary.json, tables.md and .tex, evaluations/<suites> unless given; made if missing."""
     report: Path | None = None
-    """Folder for report.html: tables, figures, and replays of the best, median and worst flight of each policy."""
+    """Folder for report.html and figures/: tables, figures, replays of best, median and worst flight of each policy."""
+    width: Width | None = None
+    """Width of the files in figures/: inches, or column (3.5) or text (7.16); as on the page unless given."""
+    no_title: bool = False  # Leave the titles out of the files in figures/.
     no_replays: bool = False  # Leave the replays out of the report.
     overwrite: bool = False  # Begin anew in a folder that holds another evaluation.
     json: bool = False  # Print the summary as one JSON document instead of the tables, and show no progress bar.
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
+        if self.report is None and (self.width is not None or self.no_title):
+            raise ValueError("--width and --no-title are about the figures of a --report")
+        inches(self.width)
         plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
         labels = [policy.label for policy in plan.policies]
         if self.baseline is not None and self.baseline not in labels:
@@ -70,15 +77,18 @@ class Evaluate:
         began = time.perf_counter()
         records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
         seconds = time.perf_counter() - began
-        document, tables = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
-        paths = [folder.folder / name for name in (ROWS, SUMMARY, TABLES)]
+        document, overview = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
+        paths = [folder.folder / name for name in (ROWS, SUMMARY, TABLES, LATEX)]
         if self.report is not None:
             writer = None if self.no_replays else _replay_writer()
-            paths.append(write_report(folder.folder, into=self.report, plan=plan, replay=writer))
+            width, titled = inches(self.width), not self.no_title
+            page = write_report(folder.folder, into=self.report, plan=plan, replay=writer, width=width, titled=titled)
+            paths.append(page)
         if self.json:
             print(json.dumps(document, indent=1, allow_nan=False))
         else:
-            print_tables(tables)
+            print_tables(overview)
+            print("\nEach mission, crossings, energy, clearance and differences: in tables.md")
             print(*paths, sep="\n")
         return 0
 

@@ -13,6 +13,7 @@ from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.flight_figures import draw_flight
 from hydrone_gym.evaluation.saved import FORMAT, VERSION, flight_record
 from hydrone_gym.evaluation.tables import Table, print_tables
+from hydrone_gym.rendering.files import Width, drawn_width, inches, save_figure
 
 _TREE_ITERATIONS = 400  # samples of the tree figure
 
@@ -24,9 +25,13 @@ class Fly(MissionOptions):
     out: Path = Path("flights")  # Folder for figures and flight.json; made if missing.
     json: bool = False  # Print one JSON document instead of the table.
     no_figures: bool = False  # Draw no figures.
+    width: Width | None = None
+    """Width of the figures on paper: inches, or column (3.5) or text (7.16); unless given, as large as on a screen."""
+    no_title: bool = False  # Leave the titles out of the figures.
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
+        width = inches(self.width)
         missions = self.prepare()
         self.out.mkdir(parents=True, exist_ok=True)
         records = []
@@ -36,7 +41,11 @@ class Fly(MissionOptions):
                 mission.policy.predict(mission.observation)  # loads the kernels: no cycle's time shall hold that
                 flight = fly(mission.env, mission.policy, seed=self.seed, scenario=mission.scenario)
                 bar.set_description(f"{mission.name}: drawing")
-                figures = [] if self.no_figures else [str(file) for file in _draw(mission, flight, self.out)]
+                figures = (
+                    []
+                    if self.no_figures
+                    else [str(file) for file in _draw(mission, flight, self.out, width=width, titled=not self.no_title)]
+                )
                 records.append({"name": mission.name, **flight_record(flight), "figures": figures})
         options = {"policy": self.policy, "seed": self.seed, "vehicle": self.vehicle}
         document = {"format": FORMAT, "version": VERSION, **options, "flights": records}
@@ -51,21 +60,25 @@ class Fly(MissionOptions):
         return 0 if all(record["success"] for record in records) else 1
 
 
-def _draw(mission: Prepared, flight: Flight, folder: Path) -> list[Path]:
+def _draw(mission: Prepared, flight: Flight, folder: Path, *, width: float | None, titled: bool) -> list[Path]:
     """Write the figures of a mission and return their paths.
 
     Of a planner with `grow_tree` also the tree that it grows from the start, every obstacle known (paper, Fig. 5).
     """
-    files = draw_flight(flight, mission.env.get_wrapper_attr("simulation"), folder, mission.name)
+    files = draw_flight(
+        flight, mission.env.get_wrapper_attr("simulation"), folder, mission.name, width=width, titled=titled
+    )
     grow_tree = getattr(mission.policy, "grow_tree", None)
     if grow_tree is None:
         return files
-    from hydrone_gym.rendering.figures import plot_tree, save_figure
+    from hydrone_gym.rendering.figures import WIDTH, plot_tree
 
     tree = grow_tree({**mission.observation, "obstacles": mission.scenario.obstacles}, _TREE_ITERATIONS)
     title = f"{mission.name.replace('-', ' ').capitalize()}: tree of {len(tree.edges)} edges, every obstacle known"
-    figure = plot_tree(tree, mission.scenario, mission.env.get_wrapper_attr("world"), title=title)
-    return files + save_figure(figure, folder / f"{mission.name}-tree")
+    figure = plot_tree(
+        tree, mission.scenario, mission.env.get_wrapper_attr("world"), title=title, width=drawn_width(width, WIDTH)
+    )
+    return files + save_figure(figure, folder / f"{mission.name}-tree", width=width, titled=titled)
 
 
 def _cells(record: dict[str, Any]) -> dict[str, str]:

@@ -14,6 +14,7 @@ from hydrone_gym.control.reference import Instant, Reference
 from hydrone_gym.evaluation.flight import Flight, Trace
 from hydrone_gym.physics.dynamics import medium_at
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
+from hydrone_gym.rendering.files import drawn_width, save_figure
 from hydrone_gym.simulation.simulation import TICK, Simulation
 from hydrone_gym.simulation.storage import vehicle_of, world_of
 from hydrone_gym.surface import is_air
@@ -52,24 +53,36 @@ def attitude_references(simulation: Simulation, trace: Trace) -> NDArray[np.floa
     return out
 
 
-def draw_flight(flight: Flight, simulation: Simulation, directory: Path, name: str) -> list[Path]:
+def draw_flight(
+    flight: Flight,
+    simulation: Simulation,
+    directory: Path,
+    name: str,
+    *,
+    width: float | None = None,
+    titled: bool = True,
+) -> list[Path]:
     """Write path, position and attitude of a flight as PNG and PDF; return the paths.
 
     `simulation` is that of the environment it was flown in; `name` begins the name of every file in the existing
-    `directory`, and with a capital letter every title.
+    `directory`, and with a capital letter every title. `width` (inches) is that of a paper's column.
     """
-    from hydrone_gym.rendering.figures import plot_attitude, plot_path, plot_position, save_figure
+    from hydrone_gym.rendering.figures import WIDTH, plot_attitude, plot_path, plot_position
 
     times, states, references = flight.trace
     world, position, wanted = simulation.world, states[:, :3], attitude_references(simulation, flight.trace)
     title, zone = name[:1].upper() + name[1:].replace("-", " "), world.zone
     ending = f"{title}: {flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"
     spheres = (flight.detected, flight.undetected)
+    look: dict[str, Any] = {"world": world, "width": drawn_width(width, WIDTH), "title": ending}
     figures = {
-        "path": plot_path(position, flight.scenario.goal, *spheres, lower=world.lower, upper=world.upper, title=ending),
+        "path": plot_path(position, flight.scenario.goal, *spheres, **look),
         "position": plot_position(times, position, references[:, :3], zone=zone, title=f"{title}: position over time"),
         "attitude": plot_attitude(
             times, states[:, 3:6], wanted, states[:, 2], zone=zone, title=f"{title}: attitude over time"
         ),
     }
-    return [file for kind, figure in figures.items() for file in save_figure(figure, directory / f"{name}-{kind}")]
+    files = []
+    for kind, figure in figures.items():
+        files += save_figure(figure, directory / f"{name}-{kind}", width=width, titled=titled)
+    return files

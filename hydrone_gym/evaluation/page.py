@@ -13,10 +13,10 @@ from urllib.parse import quote
 
 import jinja2
 
-from hydrone_gym.evaluation.page_figures import SEVERAL, charts_of
+from hydrone_gym.evaluation.page_figures import FIGURES, SEVERAL, charts_of, write_figures
 from hydrone_gym.evaluation.plan import Plan, plan_of
 from hydrone_gym.evaluation.records import Record
-from hydrone_gym.evaluation.run_folder import ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
+from hydrone_gym.evaluation.run_folder import LATEX, ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
 from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
 from hydrone_gym.evaluation.summary import ALL_MISSIONS
 from hydrone_gym.evaluation.tables import Table, tables_of
@@ -29,6 +29,7 @@ _FILES = {
     ROWS: "a row a flight, with everything measured",
     SUMMARY: "the statistics, arguments, versions, commit and machine",
     TABLES: "the tables as Markdown",
+    LATEX: "the tables as LaTeX, for a text that uses the package booktabs",
 }
 Written = Mapping[Record, tuple[Path, Record]]
 
@@ -39,17 +40,21 @@ def write_report(
     into: str | os.PathLike[str] | None = None,
     plan: Plan | None = None,
     replay: Writer | None = None,
+    width: float | None = None,
+    titled: bool = True,
 ) -> Path:
     """Write the report of an evaluation, finished or not, and return the path of the page.
 
     Args:
         folder: of the evaluation, with `rows.csv` and `summary.json`.
-        into: where to write `report.html`, copies of the rows, summary and tables, and the folder `replays`; made if
-            missing; the evaluation's own folder unless given.
+        into: where to write `report.html`, copies of the rows, summary and tables, and the folders `figures` and
+            `replays`; made if missing; the evaluation's own folder unless given.
         plan: of the evaluation, to fly from; found again from the summary unless given, which works for frozen suites
             and for policies that other processes can import.
         replay: writes the replay of a flight, as `rendering.replay.write_replay` does. Without one the page names the
             worlds and the command that shows them.
+        width: of the files in `figures`, inches, their text then of 8 points; as large as on the page unless given.
+        titled: whether they have titles.
 
     Raises FileNotFoundError for no rows or summary, or a suite that cannot be found again, ValueError for those that
     are damaged or do not fit each other, or policies that cannot be found again.
@@ -66,9 +71,14 @@ def write_report(
     flown: Written = {}
     if replay is not None:
         flown = write_replays(shown, plan or plan_of(stored.arguments), target / REPLAYS, replay)
+    charts = charts_of(stored.records, stored.summaries)
+    drawn = write_figures(charts, target / FIGURES, width=width, titled=titled)
+    files = {
+        words: [(path.suffix[1:].upper(), f"{FIGURES}/{path.name}") for path in paths] for words, paths in drawn.items()
+    }
     options: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "undefined": jinja2.StrictUndefined}
     template = jinja2.Environment(**options).from_string(_TEMPLATE.read_text(encoding="utf-8"))
-    write_whole(target / PAGE, template.render(_content(stored, shown, flown, target)))
+    write_whole(target / PAGE, template.render(_content(stored, shown, flown, target), charts=charts, drawn=files))
     return target / PAGE
 
 
@@ -85,7 +95,6 @@ def _content(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Pat
         "facts": _facts(stored),
         "suites": [(suite, *_tables(stored, suite)) for suite in suites],
         "unfolded": _UNFOLDED,
-        "charts": charts_of(stored.records, stored.summaries),
         "shown": [(policy, [_flight(record, flown, folder) for record in records]) for policy, *records in shown],
         "command": "" if flown else _command(shown[0].worst),
         "files": {name: words for name, words in _FILES.items() if (folder / name).exists()},

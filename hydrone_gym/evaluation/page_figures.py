@@ -1,46 +1,50 @@
 """The figures of the report page: records into panels of `rendering.comparison`, with captions."""
 
 import math
+import re
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.statistics import wilson_interval
-from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary
-from hydrone_gym.rendering.comparison import plot_decisions, plot_density, plot_distributions, plot_success, to_svg
-from hydrone_gym.world.world import World
+from hydrone_gym.evaluation.summary import ALL_MISSIONS, LIMITS, MissionSummary
+from hydrone_gym.rendering.comparison import plot_decisions, plot_density, plot_distributions, plot_success
+from hydrone_gym.rendering.files import save_figure, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SEVERAL = 4  # missions of a suite that are shown one by one; of more, all together
 _LEAST_MS = 1e-3  # a logarithmic axis has no zero
-_ROUGH = World().rough_speed
+_ROUGH, _TILTED = LIMITS.rough_speed, math.degrees(LIMITS.rough_tilt)
+FIGURES = "figures"  # folder beside the page
 _BOX = "Boxes span the quartiles around the median, whiskers the 5th to the 95th percentile; dots are flights beyond."
 _CAPTIONS = {
     "Success": "Share of all flights that arrived, with the 95 % Wilson interval.",
-    "Time and energy": f"""Over the flights that arrived, n of them. {_BOX} A policy that arrives only in easy worlds
-looks quick here; the tables of differences compare equal worlds.""",
     "Success against density": """Share of all flights that arrived, over all missions of a suite, with the 95 % Wilson
 interval. Policies stand side by side around their number of obstacles.""",
     "Clearance": f"""Least distance between the sphere around the vehicle and an obstacle, over all n flights in worlds
 with obstacles. Below zero they touched. {_BOX}""",
-    "Speed at the crossing": f"""Largest lateral and vertical speed of a flight at its crossings of the surface, over
-all n flights that crossed. A crossing is rough above {_ROUGH:g} m/s laterally. {_BOX}""",
+    "Crossings": f"""Largest lateral speed, tilt and vertical speed of a flight at its crossings of the surface, over
+all n flights that crossed. A crossing is rough above {_ROUGH:g} m/s laterally or {_TILTED:g}° of tilt. {_BOX}""",
+    "Time and energy": f"""Over the flights that arrived, n of them. {_BOX} A policy that arrives only in easy worlds
+looks quick here; the tables of differences compare equal worlds.""",
     "Time of a decision": """Wall-clock time that a policy takes to choose a reference: medians over all flights of each
 flight's 50th and 99th percentile.""",
 }
 
 
 class Panel(NamedTuple):
-    """An image, as an address that holds it, and words that stand for it where it is not seen."""
+    """A figure, words that stand for it where it is not seen, and an address that holds its image."""
 
-    address: str
+    figure: "Figure"
     words: str
+    address: str
 
 
 class Chart(NamedTuple):
@@ -67,9 +71,10 @@ _TIMES = (
     _Measure("time", "time to the goal (s)", arrived=True),
     _Measure("energy", "energy of the rotors (kJ)", 1e-3, arrived=True),
 )
-_CLEARANCE = _Measure("clearance", "least distance to an obstacle (m)", limit=0.0, limit_label="contact")
+_CLEARANCE = _Measure("clearance", "least clearance (m)", limit=0.0, limit_label="contact")
 _SPEEDS = (
-    _Measure("lateral_speed", "lateral speed (m/s)", limit=_ROUGH, limit_label=f"rough above {_ROUGH:g}"),
+    _Measure("lateral_speed", "lateral speed (m/s)", limit=_ROUGH, limit_label=f"rough above {_ROUGH:g} m/s"),
+    _Measure("tilt", "tilt (°)", math.degrees(1.0), limit=_TILTED, limit_label=f"rough above {_TILTED:g}°"),
     _Measure("vertical_speed", "vertical speed (m/s)"),
 )
 
@@ -82,14 +87,34 @@ def charts_of(records: Sequence[Record], summaries: Sequence[MissionSummary]) ->
     rest = [s for s in summaries if missions[s.suite] > SEVERAL and s.mission != ALL_MISSIONS]
     panels = {
         "Success": [_success(policies, summary) for summary in shown],
-        "Time and energy": _boxes(policies, records, shown, *_TIMES),
         "Success against density": _density(policies, records),
         "Clearance": _boxes(policies, records, shown, _CLEARANCE),
-        "Speed at the crossing": _boxes(policies, records, shown, *_SPEEDS),
+        "Crossings": _boxes(policies, records, shown, *_SPEEDS),
+        "Time and energy": _boxes(policies, records, shown, *_TIMES),
         "Time of a decision": [_decisions(policies, records)],
     }
     folded = {"Success": [_success(policies, summary) for summary in rest]}
     return [Chart(name, _CAPTIONS[name], drawn, folded.get(name, ())) for name, drawn in panels.items() if drawn]
+
+
+def write_figures(charts: Sequence[Chart], folder: Path, *, width: float | None, titled: bool) -> dict[str, list[Path]]:
+    """Write every panel as PDF and SVG into a folder, made if missing, and return the files by the panel's words.
+
+    `width` is that of a paper's column in inches, None for the size on the page.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = {}
+    for number, panel in enumerate(_panels(charts), start=1):
+        name = f"{number:02}-{re.sub('[^a-z0-9.]+', '-', panel.words.lower())[:80].strip('-.')}"
+        written[panel.words] = save_figure(
+            panel.figure, folder / name, width=width, titled=titled, formats=("pdf", "svg")
+        )
+    return written
+
+
+def _panels(charts: Sequence[Chart]) -> Iterator[Panel]:
+    for chart in charts:
+        yield from (*chart.panels, *chart.folded)
 
 
 def _success(policies: Sequence[str], summary: MissionSummary) -> Panel:
@@ -148,4 +173,5 @@ def _boxes(
 
 
 def _panel(figure: "Figure", words: str) -> Panel:
-    return Panel(f"data:image/svg+xml;base64,{b64encode(to_svg(figure, words).encode()).decode()}", words)
+    image = to_svg(figure, words).encode()
+    return Panel(figure, words, f"data:image/svg+xml;base64,{b64encode(image).decode()}")

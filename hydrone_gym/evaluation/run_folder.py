@@ -4,7 +4,7 @@
 |---|---|
 | `run.json` | the arguments |
 | `rows.csv` | a row a flight |
-| `summary.json`, `tables.md` | what came of it |
+| `summary.json`, `tables.md`, `tables.tex` | what came of it |
 """
 
 import dataclasses
@@ -21,9 +21,9 @@ from hydrone_gym.evaluation.provenance import commit, machine, versions
 from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, read_records, to_line
 from hydrone_gym.evaluation.statistics import Estimate
 from hydrone_gym.evaluation.summary import MissionSummary, summarise
-from hydrone_gym.evaluation.tables import Table, markdown, tables_of
+from hydrone_gym.evaluation.tables import Table, latex, markdown, overview, tables_of
 
-RUN, ROWS, SUMMARY, TABLES = "run.json", "rows.csv", "summary.json", "tables.md"
+RUN, ROWS, SUMMARY, TABLES, LATEX = "run.json", "rows.csv", "summary.json", "tables.md", "tables.tex"
 FORMAT = "hydrone_gym evaluation"
 VERSION = 1
 _PARTS = {"versions", "commit", "machine", "date", "seconds", "rows", "complete", "missions"}
@@ -45,7 +45,7 @@ class RunFolder:
         folder.mkdir(parents=True, exist_ok=True)
         run = folder / RUN
         if overwrite:
-            for name in (RUN, ROWS, SUMMARY, TABLES):
+            for name in (RUN, ROWS, SUMMARY, TABLES, LATEX):
                 (folder / name).unlink(missing_ok=True)
         if run.exists():
             _compare(run, json.loads(json.dumps(arguments)))
@@ -95,7 +95,7 @@ def _compare(run: Path, arguments: dict[str, Any]) -> None:
 def write_results(
     plan: Plan, records: Sequence[Record], folder: Path, *, baseline: str | None = None, seconds: float | None = None
 ) -> tuple[dict[str, Any], list[Table]]:
-    """Sum up the records of a plan, at least one, write `summary.json` and `tables.md`, and return what they hold.
+    """Sum up the records of a plan, at least one, write summary and tables, and return the summary and its overview.
 
     `seconds` is the wall-clock time that this run took, s.
     """
@@ -116,7 +116,8 @@ def write_results(
     tables = tables_of(summaries)
     _write_json(folder / SUMMARY, document)
     write_whole(folder / TABLES, markdown(tables))
-    return document, tables
+    write_whole(folder / LATEX, latex(tables))
+    return document, overview(summaries)
 
 
 def _plain(fields: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -10,9 +10,11 @@ import numpy as np
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, paired_success, wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
+from hydrone_gym.world.world import World
 
 ALL_MISSIONS = "all missions"
 BASELINE = "clrrt"  # policy that the others are compared with unless another is named
+LIMITS = World()  # of a rough crossing, the same in every environment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +34,12 @@ class PolicySummary:
     length: Estimate | None  #: likewise, m; None for flights in batches too
     energy: Estimate | None  #: likewise, J
     clearance: float | None  #: least distance to an obstacle over all flights, m; None without obstacles
-    lateral_speed: float | None  #: largest at a crossing over all flights, m/s; None without crossings
-    tilt: float | None  #: likewise, rad
+    crossed: int  #: flights that crossed the surface
+    rough: Estimate | None  #: share of those with a rough crossing, with the 95 % Wilson interval; None without any
+    lateral_speed: Estimate | None  #: of each of those its largest at a crossing, m/s: interquartile mean, interval
+    lateral_speed_max: float | None  #: the largest of all, m/s
+    tilt: Estimate | None  #: likewise, rad
+    tilt_max: float | None
     interventions: float | None  #: of the shield, mean a flight; None without a shield
     decision_ms_p50: float  #: median over flights of each flight's percentile, ms
     decision_ms_p99: float
@@ -128,12 +134,13 @@ def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
     def there(name: str, among: Sequence[Record] = records) -> list[float]:
         return [getattr(r, name) for r in among if getattr(r, name) is not None]
 
-    interventions = there("interventions")
+    interventions, lateral_speed, tilt = map(there, ("interventions", "lateral_speed", "tilt"))
+    crossed = [record for record in records if record.crossings]
     return PolicySummary(
         policy=name,
         rank=0,
         worlds=len(records),
-        success=Estimate(len(arrived) / len(records), *wilson_interval(len(arrived), len(records))),
+        success=_share(len(arrived), len(records)),
         collisions=ends["COLLISION"],
         rough_crossings=ends["ROUGH_TRANSITION"],
         timeouts=ends["TIMEOUT"],
@@ -143,12 +150,26 @@ def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
         length=_estimate(there("length", arrived)),
         energy=_estimate(there("energy", arrived)),
         clearance=min(there("clearance"), default=None),
-        lateral_speed=max(there("lateral_speed"), default=None),
-        tilt=max(there("tilt"), default=None),
+        crossed=len(crossed),
+        rough=_share(sum(map(_is_rough, crossed)), len(crossed)) if crossed else None,
+        lateral_speed=_estimate(lateral_speed),
+        lateral_speed_max=max(lateral_speed, default=None),
+        tilt=_estimate(tilt),
+        tilt_max=max(tilt, default=None),
         interventions=float(np.mean(interventions)) if interventions else None,
         decision_ms_p50=float(np.median(there("decision_ms_p50"))),
         decision_ms_p99=float(np.median(there("decision_ms_p99"))),
     )
+
+
+def _is_rough(record: Record) -> bool:
+    """Tell whether a flight crossed roughly: also where that is only counted, and flights go on."""
+    over = (record.lateral_speed or 0.0) > LIMITS.rough_speed or (record.tilt or 0.0) > LIMITS.rough_tilt
+    return over or record.outcome == Outcome.ROUGH_TRANSITION.name
+
+
+def _share(count: int, of: int) -> Estimate:
+    return Estimate(count / of, *wilson_interval(count, of))
 
 
 def _comparison(name: str, pairs: Sequence[tuple[Record, Record]]) -> Comparison:

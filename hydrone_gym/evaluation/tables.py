@@ -1,19 +1,20 @@
-"""Tables for people: the same rows as Markdown, on a terminal and on the page of a report.
+"""Tables for people: the same rows as Markdown, as LaTeX, on a terminal and on the page of a report.
 
 A figure is followed by its 95 % interval: 20.4 [20.3, 20.5].
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from hydrone_gym.evaluation.statistics import Estimate
-from hydrone_gym.evaluation.summary import Comparison, MissionSummary, PolicySummary
+from hydrone_gym.evaluation.summary import LIMITS, Comparison, MissionSummary, PolicySummary
+from hydrone_gym.rendering.comparison import shortened
 
-_WIDTH = 120  # characters that every table fits in
-_COUNTS = ("collisions", "rough\ncrossings", "timeouts", "other")
-_OUTCOME = ("policy", "worlds", "success (%)", *_COUNTS, "least clear-\nance (m)", "inter-\nventions")
-_MEASURES = ("policy", "time (s)", "length (m)", "energy (J)", "decision\np50 / p99 (ms)")
-_DIFFERENCE = ("policy", "success (points)", "only it /\nbaseline", "p", "both\narrive", "time (s)", "energy (J)")
+_WIDTH = 120  # characters that every table fits in; an overview fits in 80
+_NAME = 22  # characters of a policy in an overview
+_NONE = "–"
+_MIDDLE = "interquartile mean (of the middle half) with its 95 % bootstrap interval"
 
 
 class Table(NamedTuple):
@@ -23,32 +24,63 @@ class Table(NamedTuple):
     heads: tuple[str, ...]  # of the columns, with line breaks
     rows: tuple[tuple[str, ...], ...]
     policies: tuple[str, ...] = ()  # that the rows tell of
+    notes: tuple[str, ...] = ()  # lines beneath it that explain the columns
 
 
 def tables_of(summaries: Sequence[MissionSummary]) -> list[Table]:
-    """Return for each mission how flights ended, what those that arrived took, and the differences to the baseline."""
+    """Return for each mission how flights ended, crossed and decided, what arriving took, and all less the baseline."""
     tables = []
     for s in summaries:
-        title, ranked = f"{s.suite}, {s.mission}", tuple(p.policy for p in s.policies)
-        outcomes, measures = tuple(map(_outcome, s.policies)), tuple(map(_measures, s.policies))
-        tables.append(Table(f"{title}: outcomes", _OUTCOME, outcomes, ranked))
-        tables.append(Table(f"{title}: flights that arrived, and decisions of all", _MEASURES, measures, ranked))
-        if s.comparisons:
-            title += f": differences to {s.baseline} on the same worlds"
-            compared = tuple(c.policy for c in s.comparisons)
-            tables.append(Table(title, _DIFFERENCE, tuple(map(_difference, s.comparisons)), compared))
+        crossed = tuple(p for p in s.policies if p.crossed)
+        told: tuple[tuple[_Kind, tuple[Any, ...]], ...] = (
+            (_OUTCOMES, s.policies),
+            (_CROSSINGS, crossed),
+            (_ARRIVED, s.policies),
+            (_DECISIONS, s.policies),
+            (_DIFFERENCES, s.comparisons),
+        )
+        tables += [_table(f"{s.suite}, {s.mission}", s.baseline, *one) for one in told if one[1]]
     return tables
 
 
+def overview(summaries: Sequence[MissionSummary]) -> list[Table]:
+    """Return one narrow table a suite, over all its missions."""
+    last = {s.suite: s for s in summaries}.values()  # the missions together come after each of them
+    return [_table(f"{s.suite}, {s.mission}", s.baseline, _OVERVIEW, s.policies) for s in last]
+
+
+class _Kind(NamedTuple):
+    """What a table tells of its policies: title, heads, the cells of one of them, notes."""
+
+    title: str
+    heads: tuple[str, ...]
+    cells: Callable[[Any], tuple[str, ...]]
+    notes: tuple[str, ...]
+
+
+def _table(where: str, baseline: str, kind: _Kind, entries: Sequence[PolicySummary | Comparison]) -> Table:
+    title, names = kind.title.format(baseline=baseline), tuple(entry.policy for entry in entries)
+    return Table(f"{where}: {title}", kind.heads, tuple(map(kind.cells, entries)), names, kind.notes)
+
+
 def _outcome(p: PolicySummary) -> tuple[str, ...]:
-    counts = (p.collisions, p.rough_crossings, p.timeouts, p.out_of_bounds + p.diverged)
-    shares = (_cell(p.success, 1, 100.0), *map(str, counts), _cell(p.clearance, 2), _cell(p.interventions, 1))
-    return (f"{p.rank}. {p.policy}", str(p.worlds), *shares)
+    counts = map(str, (p.collisions, p.rough_crossings, p.timeouts, p.out_of_bounds + p.diverged))
+    others = _cell(p.clearance, 2), _cell(p.interventions, 1)
+    return (f"{p.rank}. {p.policy}", str(p.worlds), _cell(p.success, 1, 100.0), *counts, *others)
+
+
+def _crossing(p: PolicySummary) -> tuple[str, ...]:
+    speeds = _cell(p.lateral_speed, 3), _cell(p.lateral_speed_max, 3)
+    tilts = _cell(p.tilt, 2, math.degrees(1.0)), _cell(p.tilt_max, 2, math.degrees(1.0))
+    return (p.policy, str(p.crossed), _cell(p.rough, 1, 100.0), *speeds, *tilts)
 
 
 def _measures(p: PolicySummary) -> tuple[str, ...]:
-    decisions = f"{p.decision_ms_p50:.2f} / {p.decision_ms_p99:.2f}"
-    return (p.policy, _cell(p.time, 2), _cell(p.length, 1), _cell(p.energy, 0), decisions)
+    return (p.policy, _cell(p.time, 2), _cell(p.length, 1), _cell(p.energy, 0))
+
+
+def _decision(p: PolicySummary) -> tuple[str, ...]:
+    return (p.policy, _cell(p.decision_ms_p50, 2), _cell(p.decision_ms_p99, 2))
 
 
 def _difference(c: Comparison) -> tuple[str, ...]:
@@ -57,23 +89,128 @@ def _difference(c: Comparison) -> tuple[str, ...]:
     return (c.policy, success, *worlds, time, energy)
 
 
+def _brief(p: PolicySummary) -> tuple[str, ...]:
+    others = p.timeouts + p.out_of_bounds + p.diverged
+    counts = map(str, (p.collisions, p.rough_crossings, others))
+    time = None if p.time is None else p.time.value
+    name = shortened(p.policy, _NAME)
+    return (name, _cell(p.success, 1, 100.0), *counts, _cell(time, 1), _cell(p.decision_ms_p99, 2))
+
+
 def _cell(value: Estimate | float | None, digits: int, scale: float = 1.0, sign: str = "") -> str:
     """Return a value, with its interval if it has one; `sign` "+" shows the sign of positive numbers."""
     if value is None:
-        return "-"
+        return _NONE
     numbers = value if isinstance(value, Estimate) else (value,)
-    shown, *ends = [f"{scale * number:{sign}.{digits}f}" for number in numbers if number is not None]
+    written = (f"{scale * number:{sign}z.{digits}f}" for number in numbers if number is not None)
+    shown, *ends = [number.replace("-", "−") for number in written]
     return f"{shown} [{', '.join(ends)}]" if ends else shown
+
+
+_OUTCOMES = _Kind(
+    "outcomes",
+    (
+        *("policy", "worlds", "success (%)", "collisions", "rough\ncrossings", "time-\nouts", "other"),
+        *("least clear-\nance (m)", "inter-\nventions"),
+    ),
+    _outcome,
+    (
+        "Success: share of the flights that arrived, with its 95 % Wilson interval.",
+        "Other: flights that left the box or diverged.",
+        "Least clearance: of all flights, between the vehicle's sphere and an obstacle; below zero they overlap.",
+        f"Interventions: periods in which the shield flew another reference, mean a flight; {_NONE} without a shield.",
+    ),
+)
+_CROSSINGS = _Kind(
+    "flights that crossed the surface",
+    ("policy", "flights", "rough (%)", "lateral speed (m/s)", "largest\n(m/s)", "tilt (°)", "largest\n(°)"),
+    _crossing,
+    (
+        f"Rough: share of these flights that crossed faster than {LIMITS.rough_speed:g} m/s sideways or tilted by more "
+        f"than {math.degrees(LIMITS.rough_tilt):g}°, with its 95 % Wilson interval.",
+        f"Lateral speed, tilt: each flight's largest at a crossing; {_MIDDLE}. Largest: of all flights.",
+    ),
+)
+_ARRIVED = _Kind(
+    "flights that arrived",
+    ("policy", "time (s)", "length (m)", "energy (J)"),
+    _measures,
+    (f"Time, length, energy: {_MIDDLE}.",),
+)
+_DECISIONS = _Kind(
+    "decisions of all flights",
+    ("policy", "p50 (ms)", "p99 (ms)"),
+    _decision,
+    ("p50, p99: of the wall-clock time of a decision, each flight's percentile; median over all flights.",),
+)
+_DIFFERENCES = _Kind(
+    "differences to {baseline} on the same worlds",
+    ("policy", "success (points)", "only it /\nbaseline", "p", "both\narrive", "time (s)", "energy (J)"),
+    _difference,
+    (
+        "Success: the policy's less the baseline's in percentage points, with Newcombe's 95 % interval for pairs.",
+        "Only it / baseline: worlds in which only the policy arrived / only the baseline. p: McNemar's exact test.",
+        f"Time, energy: the policy's less the baseline's where both arrived; {_MIDDLE}.",
+        "An interval that holds zero leaves open which of the two is better.",
+    ),
+)
+_OVERVIEW = _Kind(
+    "in short",
+    ("policy", "success (%)\n[95 %]", "colli-\nsions", "rough", "other", "time\n(s)", "p99\n(ms)"),
+    _brief,
+    (),
+)
 
 
 def markdown(tables: Sequence[Table]) -> str:
     """Return tables as a Markdown text."""
     parts = []
-    for title, heads, rows, _ in tables:
+    for title, heads, rows, _, notes in tables:
         cells = [[cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in (heads, *rows)]
         head, *lines = [f"| {' | '.join(row)} |" for row in cells]
         parts.append("\n".join([f"### {title}\n", head, "|---|" + "---:|" * (len(heads) - 1), *lines]))
+        parts += ["\n".join(f"- {note}" for note in notes)] if notes else []
     return "\n\n".join(parts) + "\n"
+
+
+_SIGNS: dict[str, Any] = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "−": "$-$",
+    "–": "--",
+}
+_SIGNS |= {"°": r"$^\circ$", "<": "$<$", ">": "$>$", "|": "$|$"} | {sign: f"\\{sign}" for sign in "&%$#_{}"}
+_ESCAPES = str.maketrans(_SIGNS)
+_LATEX = r"""\begin{table}
+\centering\footnotesize\setlength{\tabcolsep}{4pt}
+\caption{%s. %s}
+\begin{tabular}{%s}
+\toprule
+%s \\
+\midrule
+%s \\
+\bottomrule
+\end{tabular}
+\end{table}
+"""
+
+
+def latex(tables: Sequence[Table]) -> str:
+    """Return tables as LaTeX, a floating `table` each with its notes in the caption; it needs the package booktabs."""
+
+    def escaped(text: str) -> str:
+        return text.translate(_ESCAPES)
+
+    def row(cells: Sequence[str]) -> str:
+        return " & ".join(rf"\shortstack[r]{{{cell}}}".replace("\n", r"\\") if "\n" in cell else cell for cell in cells)
+
+    parts = ["% \\usepackage{booktabs}\n"]
+    for title, heads, rows, _, notes in tables:
+        head, *lines = [row(list(map(escaped, cells))) for cells in (heads, *rows)]
+        columns, body = "l" + "r" * (len(heads) - 1), " \\\\\n".join(lines)
+        parts.append(_LATEX % (escaped(title), escaped(" ".join(notes)), columns, head, body))
+    return "\n".join(parts)
 
 
 def print_tables(tables: Sequence[Table]) -> None:
@@ -87,8 +224,9 @@ def print_tables(tables: Sequence[Table]) -> None:
     if not console.is_terminal:
         console = Console(width=_WIDTH)
     whole = console.width >= _WIDTH  # else cells are broken rather than cut
-    for title, heads, rows, _ in tables:
-        shown = Shown(title=title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    look: dict[str, Any] = {"title_justify": "left", "box": SIMPLE_HEAD, "pad_edge": False, "collapse_padding": True}
+    for title, heads, rows, *_ in tables:
+        shown = Shown(title=title or None, show_edge=False, **look)
         for index, head in enumerate(heads):
             shown.add_column(head, justify="right" if index else "left", no_wrap=whole or not index)
         for row in rows:

@@ -1,14 +1,14 @@
 """Figures that compare policies: success, distributions, success against density, times of decisions.
 
 Every figure is one small panel, wide enough for a phone, and has all policies as rows in the same order and colours;
-a policy without values keeps its row. Functions take plain arrays and return Matplotlib figures; `to_svg` writes them.
+a policy without values keeps its row. Functions take plain arrays and return Matplotlib figures;
+`rendering.files` writes them.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 # Okabe and Ito's eight; yellow last, for it is faint on white
 COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.WATER, style.RED, style.BLACK, "#F0E442")
 _MARKERS = "osD^vP*X"
-_WIDTH = 5.2  # inches of a panel
+_WIDTH = 4.8  # inches of a panel
 _ROW = 0.37  # inches a policy takes
 _EDGE = "#333333"
 _RIM: dict[str, Any] = {"markeredgecolor": _EDGE, "markeredgewidth": 0.5}
 _MUTED = "#5a6570"
-_LABEL, _TITLE = 22, 44  # characters that fit
+_LABEL, _TITLE = 22, 42  # characters that fit
 
 
 def colour(index: int) -> str:
@@ -113,14 +113,6 @@ def plot_decisions(times: Mapping[str, tuple[float, float]], *, title: str = "")
     return figure
 
 
-def to_svg(figure: Figure, salt: str) -> str:
-    """Return a figure as SVG whose text stays text; equal figures of equal `salt` give equal bytes."""
-    stream = io.StringIO()
-    with _rules(salt):
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-    return stream.getvalue()
-
-
 def shortened(text: str, length: int) -> str:
     """Return a text of at most so many characters, its middle left out if it is longer."""
     if len(text) <= length:
@@ -129,20 +121,12 @@ def shortened(text: str, length: int) -> str:
     return f"{text[: kept // 2]}…{text[len(text) - kept + kept // 2 :]}"
 
 
-def _rules(salt: str = "") -> AbstractContextManager[None]:
-    """Return the style to be applied; a dollar in the name of a policy is a dollar, and text in SVG stays text."""
-    from matplotlib import rc_context
-
-    own = {"text.parse_math": False, "svg.fonttype": "none", "svg.hashsalt": f"hydrone-{salt}"}
-    return rc_context({**style.FONTS, **own})
-
-
 @contextmanager
 def _drawing(height: float, title: str) -> Iterator[tuple[Figure, Axes]]:
     """Yield a new figure and its axes, to be filled in the style."""
     from matplotlib.figure import Figure
 
-    with _rules():
+    with style.applied():
         figure = Figure(figsize=(_WIDTH, height), dpi=style.DOTS_PER_INCH, layout="constrained")
         axes = figure.subplots()
         axes.set_axisbelow(True)
@@ -164,7 +148,7 @@ def _panel(policies: Mapping[str, Any], title: str) -> Iterator[tuple[Figure, Ax
 
 def _note(axes: Axes, row: int, text: str) -> None:
     """Write a short text right of a row."""
-    axes.text(1.03, row, text, transform=axes.get_yaxis_transform(), va="center", fontsize=10, color=_MUTED)
+    axes.text(1.03, row, text, transform=axes.get_yaxis_transform(), va="center", fontsize=11, color=_MUTED)
 
 
 def _interval(axes: Axes, row: int, low: float, high: float) -> None:
@@ -178,7 +162,7 @@ def _limit(axes: Axes, limit: float, label: str) -> None:
     """Mark a value by a line, with words above the first row, on the side where there is more room."""
     axes.axvline(limit, color=style.RED, linewidth=1.6, linestyle="--")
     left = limit > sum(axes.get_xlim()) / 2.0
-    look: dict[str, Any] = {"color": style.RED, "fontsize": 10, "ha": "right" if left else "left", "va": "top"}
+    look: dict[str, Any] = {"color": style.RED, "fontsize": 11, "ha": "right" if left else "left", "va": "top"}
     axes.annotate(label, (limit, 1.0), (-4 if left else 4, -1), ("data", "axes fraction"), "offset points", **look)
     axes.set_ylim(bottom=axes.get_ylim()[0], top=-1.1)
 

@@ -1,13 +1,12 @@
 """Figures of a flight: its path (paper, Figs. 6 and 9), position (7, 10) and attitude (8, 11); and a tree (5).
 
-Functions take arrays in SI units and return Matplotlib figures; `save_figure` writes them as PNG and PDF. Matplotlib is
-imported when the first figure is drawn, and no display is needed.
+Functions take arrays in SI units and return Matplotlib figures; `rendering.files` writes them. Matplotlib is imported
+when the first figure is drawn, and no display is needed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import side_azimuth
 from hydrone_gym.rendering.paths import crossing_points, dash, split_media
-from hydrone_gym.rendering.scene3d import Scene
+from hydrone_gym.rendering.scene3d import WIDE, WIDTH, Scene
 from hydrone_gym.rendering.track import Tree
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.scenario import Scenario
@@ -27,9 +26,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Look = dict[str, Any]
-FORMATS = ("png", "pdf")
 _BOX = World()  # that of the paper's experiments
 _DASH, _GAP = 0.3, 0.21  # m: a path under water
+_CLOSE: Look = {"columnspacing": 1.2, "handlelength": 1.5}  # a legend that fits in a column
 _LEAST_ANGLE_RANGE = 4.0  # degrees: a straight flight must not look wild
 _EXECUTED: Look = {"color": style.RED, "linewidth": 2.4}
 _REFERENCE: Look = {"color": style.BLACK, "linewidth": 1.7, "linestyle": ":"}
@@ -43,34 +42,35 @@ def plot_path(
     detected: Array,
     undetected: Array,
     *,
-    lower: tuple[float, float, float] = _BOX.lower,
-    upper: tuple[float, float, float] = _BOX.upper,
+    world: World = _BOX,
     title: str = "",
+    width: float = WIDTH,
 ) -> Figure:
     """Draw an executed path (N, 3) in its world (paper, Figs. 6 and 9), solid in air, dashed under water.
 
-    Obstacles (k, BODY) are black where detected, else faint; `lower` and `upper` are the corners of the world, m.
+    Obstacles (k, BODY) are black where detected, else faint. A sphere around the goal, to scale, is where the flight
+    arrives. `width` is in inches.
     """
-    scene = Scene(lower, upper, azimuth=side_azimuth(positions[0], goal))
+    scene = Scene(world.lower, world.upper, azimuth=side_azimuth(positions[0], goal), width=width)
     scene.obstacles(undetected, style.FAINT, alpha=0.55)
     scene.obstacles(detected, style.DETECTED)
     air, water = split_media(positions)
     scene.lines(air, style.RED, 2.8, hidden=0.5)
     scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
     for number, point in enumerate(crossing_points(positions)):
-        scene.mark(point, "o", style.BLUE, 11, "" if number else "crossing of the surface", hollow=True)
+        scene.mark(point, "o", style.BLUE, 11, "" if number else "crossing", hollow=True)
     red: Look = {"color": style.RED, "linewidth": 2.8}
     entries = {"path in air": red} if air else {}
     entries |= {"path under water": {**red, "linestyle": (0, (1.6, 1.1))}} if water else {}
     entries |= {"detected obstacle": _ball(style.DETECTED)}
     entries |= {"undetected obstacle": _ball(style.FAINT)} if len(undetected) else {}
-    return _finished(scene, title, (positions[0], goal), "start", entries)
+    return _finished(scene, title, (positions[0], goal, world.goal_radius), "start", entries)
 
 
-def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "") -> Figure:
+def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "", width: float = WIDTH) -> Figure:
     """Draw a planner's tree with every obstacle known (paper, Fig. 5), red in air, purple under water."""
     start, goal = scenario.start[:3], scenario.goal
-    scene = Scene(world.lower, world.upper, azimuth=side_azimuth(start, goal))
+    scene = Scene(world.lower, world.upper, azimuth=side_azimuth(start, goal), width=width)
     scene.obstacles(scenario.obstacles, style.DETECTED)
     entries: dict[str, Look] = {
         "branch in air": {"color": style.RED, "linewidth": 2.0},
@@ -82,7 +82,8 @@ def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "") 
         entries["chosen path"] = {"color": style.BLACK, "linewidth": 4.5}
     scene.lines(list(tree.edges[tree.air]), style.RED, 1.3)
     scene.lines(list(tree.edges[~tree.air]), style.PURPLE, 1.6)
-    return _finished(scene, title, (start, goal), "start (root)", {**entries, "obstacle": _ball(style.DETECTED)})
+    entries["obstacle"] = _ball(style.DETECTED)
+    return _finished(scene, title, (start, goal, world.goal_radius), "start (root)", entries)
 
 
 def plot_position(times: Array, positions: Array, references: Array, *, zone: float = 0.8, title: str = "") -> Figure:
@@ -118,16 +119,6 @@ def plot_attitude(
     return figure
 
 
-def save_figure(figure: Figure, path: str | Path) -> list[Path]:
-    """Write a figure beside `path` (no suffix) as PNG and PDF; return both paths. The folder must exist."""
-    written = [Path(f"{path}.{suffix}") for suffix in FORMATS]
-    for target in written:
-        # no date inside, so equal flights give equal files
-        dateless = {"CreationDate": None} if target.suffix == ".pdf" else None
-        figure.savefig(target, dpi=style.DOTS_PER_INCH, metadata=dateless)
-    return written
-
-
 def _histories(
     title: str, times: Array, labels: Sequence[str], executed: Array, references: Array, heights: Array, zone: float
 ) -> Figure:
@@ -140,7 +131,7 @@ def _histories(
     air, inside = in_air(heights), np.abs(heights) <= zone
     crossings = times[1:][air[1:] != air[:-1]]
     with rc_context(style.FONTS):
-        figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")
+        figure = Figure(figsize=(WIDTH, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")
         figure.suptitle(title)
         panels = figure.subplots(3, 1, sharex=True)
         for panel, label, flown, sent in zip(panels, labels, executed.T, references.T, strict=True):
@@ -157,25 +148,33 @@ def _histories(
         lines = {"executed": _EXECUTED, "reference": _REFERENCE, "crossing": _CROSSING}
         handles: list[Any] = [Line2D([], [], label=label, **look) for label, look in lines.items()]
         handles.insert(2, Patch(alpha=0.35, label="transition zone", **_ZONE))
-        figure.legend(handles=handles[: 4 if len(crossings) else 3], loc="outside lower center", ncols=4, frameon=False)
+        figure.legend(
+            handles=handles[: 4 if len(crossings) else 3], loc="outside lower center", ncols=4, frameon=False, **_CLOSE
+        )
     return figure
 
 
 def _finished(
-    scene: Scene, title: str, ends: tuple[Sequence[float], Sequence[float]], start: str, entries: dict[str, Look]
+    scene: Scene, title: str, ends: tuple[Sequence[float], Sequence[float], float], start: str, entries: dict[str, Look]
 ) -> Figure:
-    """Mark start and goal, and put a title above and a legend below: the entries, then every mark with a label."""
+    """Mark start, goal and the radius of arrival; put a title above, and below a legend: entries, then all marks."""
     from matplotlib import rc_context
     from matplotlib.lines import Line2D
 
     scene.mark(ends[0], "o", style.BLACK, 10, start)
-    scene.mark(ends[1], "X", style.PURPLE, 14, "goal")
+    scene.circle(ends[1], ends[2], style.PURPLE)
+    scene.mark(ends[1], "X", style.PURPLE, 10, "goal")
     handles = [Line2D([], [], label=label, **look) for label, look in entries.items()]
     handles += [line for line in scene.axes.lines if line.get_label() and not line.get_label().startswith("_")]
-    look: Look = {"ncols": 4, "frameon": False, "columnspacing": 1.4, "handlelength": 1.6}
+    ring: Look = {"markerfacecolor": "none", "markeredgecolor": style.PURPLE, "markeredgewidth": 1.4}
+    handles.append(
+        Line2D([], [], label=f"arrival ({ends[2]:g} m)", marker="o", markersize=13, linestyle="none", **ring)
+    )
+    columns = 4 if scene.figure.get_figwidth() >= WIDE else 2
+    look: Look = {"ncols": columns, "frameon": False, "columnspacing": 1.4, "handlelength": 1.6}
     with rc_context(style.FONTS):
         scene.figure.legend(handles=handles, loc="lower center", **look)
-        scene.figure.suptitle(title, y=0.975)
+        scene.figure.suptitle(title, y=0.975, wrap=True)
     return scene.figure
 
 

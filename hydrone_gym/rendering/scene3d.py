@@ -33,22 +33,30 @@ _PIECE = 0.25  # m: longest piece of a path that lies in one slice
 # half-angles of the lit caps, all in full view of the camera
 _CAPS = np.radians([52.0, 46.0, 40.0, 34.0, 28.0, 22.0, 15.0])
 _LIGHT = np.array([-0.35, 0.45, 0.82])  # in camera axes: right, up, towards the eye
+WIDTH, WIDE = 7.6, 6.8  # inches: the usual width; the least that has room for four names side by side
+_LEGEND, _LEGENDS = 0.58, 1.1  # inches beneath the scene for two lines of names, and for four with numbers above
 _RIM = 64  # points round an outline
 
 
 class Scene:
     """A box of the world between two corners (m), seen from an azimuth (degrees), to which objects are added."""
 
-    def __init__(self, lower: Sequence[float], upper: Sequence[float], azimuth: float = -60.0) -> None:
+    def __init__(
+        self, lower: Sequence[float], upper: Sequence[float], azimuth: float = -60.0, width: float = WIDTH
+    ) -> None:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
 
+        self._thin, self._zoom = width / WIDTH, 1.16 if width >= WIDE else 1.0
         self.camera = axes(azimuth, ELEVATION)
         (x0, y0, _), (x1, y1, _) = box = np.array((lower, upper))
         self._centre, self._reach = box.mean(axis=0), float(np.linalg.norm(box[1] - box[0]))
         with rc_context(style.FONTS):
-            self.figure: Figure = Figure(figsize=(7.6, 6.4), dpi=style.DOTS_PER_INCH)
-            self.axes: Any = self.figure.add_axes((0.01, 0.09, 0.97, 0.89), projection="3d", computed_zorder=False)
+            beneath = _LEGEND if width >= WIDE else _LEGENDS
+            height, legend = 0.766 * width + beneath, beneath / (0.766 * width + beneath)
+            self.figure: Figure = Figure(figsize=(width, height), dpi=style.DOTS_PER_INCH)
+            place = (0.01, legend, 0.97, 0.98 - legend)
+            self.axes: Any = self.figure.add_axes(place, projection="3d", computed_zorder=False)
         self._frame(box, azimuth)
         surface = [[(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)]]
         self._fill(surface, [(style.WATER, 0.30)], [(style.BLUE, 0.5)], 0.8, _SURFACE)
@@ -61,7 +69,7 @@ class Scene:
         ax.view_init(elev=ELEVATION, azim=azimuth)
         ax.set(proj_type="ortho", xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
         ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
-        ax.set_box_aspect(box[1] - box[0], zoom=1.16)
+        ax.set_box_aspect(box[1] - box[0], zoom=self._zoom)
         for axis, pad in ((ax.xaxis, 8), (ax.yaxis, 8), (ax.zaxis, 2)):
             axis.labelpad = pad
             axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
@@ -79,7 +87,7 @@ class Scene:
         """Add lines, each (n, 3) in m, so many points wide."""
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-        look = {"colors": [colour], "linewidths": width, "capstyle": "round", "zorder": order}
+        look = {"colors": [colour], "linewidths": width * self._thin, "capstyle": "round", "zorder": order}
         self.axes.add_collection3d(Line3DCollection(lines, clip_on=False, **look), autolim=False)
 
     def _order(self, points: Array, above: Any) -> Array:
@@ -115,10 +123,21 @@ class Scene:
         if hidden > 0.0:
             self._stroke(polylines, (colour, hidden), 0.6 * width, _TOP - 100.0)
 
+    def circle(self, centre: ArrayLike, radius: float, colour: str) -> None:
+        """Add the outline of a sphere around a point (3,), radius in m, never hidden."""
+        turn = np.linspace(0.0, 2.0 * np.pi, _RIM + 1)[:, None]
+        rim = np.asarray(centre) + radius * (np.cos(turn) * self.camera[0] + np.sin(turn) * self.camera[1])
+        self._fill([rim], [(colour, 0.18)], [colour], 1.4, _TOP - 2.0)
+
     def mark(self, point: ArrayLike, symbol: str, colour: str, size: float, label: str, hollow: bool = False) -> None:
         """Add a mark at a point (3,) in m, never hidden; a hollow one is open and lies beneath the others."""
-        face, edge, width = ("none", colour, 2.2) if hollow else (colour, "white", 1.0)
-        look = {"markersize": size, "markerfacecolor": face, "markeredgecolor": edge, "markeredgewidth": width}
+        face, edge, width = ("none", colour, 2.2 * self._thin) if hollow else (colour, "white", self._thin)
+        look = {
+            "markersize": size * self._thin,
+            "markerfacecolor": face,
+            "markeredgecolor": edge,
+            "markeredgewidth": width,
+        }
         x, y, z = np.reshape(point, (3, 1))
         self.axes.plot(x, y, z, symbol, label=label, zorder=_TOP - hollow, **look)
 

@@ -1,4 +1,9 @@
-"""Colours and fonts of every figure: the Okabe-Ito palette, which colour-blind readers can tell apart."""
+"""Colours and fonts of every figure.
+
+The colours are the Okabe-Ito palette, which colour-blind readers can tell apart.
+"""
+
+from contextlib import AbstractContextManager
 
 RED = "#D55E00"  # vermillion: executed paths, branches in air
 PURPLE = "#CC79A7"  # reddish purple: branches under water, the goal
@@ -21,8 +26,16 @@ FONTS: dict[str, object] = {
     "ytick.labelsize": 11,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "pdf.fonttype": 42,  # text stays text
+    "pdf.fonttype": 42,  # text stays text, in fonts that journals take
+    "svg.fonttype": "none",
 }
+
+
+def applied(salt: str = "") -> AbstractContextManager[None]:
+    """Return the fonts to be applied, and to SVG that is equal for equal `salt`; a dollar in a name is a dollar."""
+    from matplotlib import rc_context
+
+    return rc_context({**FONTS, "text.parse_math": False, "svg.hashsalt": f"hydrone-{salt}"})
 
 
 def rgb(colour: str) -> tuple[float, float, float]:

@@ -120,11 +120,12 @@ def test_loading_unpickles_nothing(folder, monkeypatch):
 def test_pickled_arrays_are_refused(folder):
     import hashlib
 
-    arrays = {"weight_0": np.array([{"a": 1}], dtype=object), "bias_0": np.zeros(1, np.float32)}
+    arrays = {"weight_0": np.array([{"a": 1}], dtype=object), "bias_0": np.zeros(3, np.float32)}
     np.savez(folder / TENSORS, **arrays)
     digest = hashlib.sha256((folder / TENSORS).read_bytes()).hexdigest()
-    rewrite(folder, tensors={"file": TENSORS, "sha256": digest})
-    with pytest.raises(ValueError, match="allow_pickle=False"):
+    network = {"sizes": [68, 3], "activation": "tanh", "output": "linear"}
+    rewrite(folder, tensors={"file": TENSORS, "sha256": digest}, network=network)
+    with pytest.raises(ValueError, match=r"weight_0.npy must be float32 \(68, 3\), got object \(1,\)"):
         load_agent(folder)
 
 
@@ -137,9 +138,12 @@ def test_pickled_arrays_are_refused(folder):
         ({"environment": "CartPole-v1"}, "not registered here"),
         ({"observation": "0"}, "another layout"),
         ({"network": {"sizes": [68, 3], "activation": "tanh", "output": "linear"}}, "were noted"),
-        ({"network": {"sizes": [68, 3], "activation": "gelu", "output": "linear"}}, "unknown activation 'gelu'"),
+        (
+            {"network": {"sizes": [68, 64, 64, 3], "activation": "gelu", "output": "linear"}},
+            "unknown activation 'gelu'",
+        ),
         ({"tensors": {"file": "other.npz", "sha256": ""}}, "other.npz are missing"),
-        ({"tensors": 3}, "must be mappings"),
+        ({"tensors": 3}, '"tensors" must be a mapping, got 3'),
     ],
 )
 def test_foreign_files(folder, changes, message):

@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
 import yaml
 
@@ -105,3 +106,20 @@ def test_the_example_of_the_docs(tmp_path, monkeypatch, capsys):
     scores = ast.literal_eval(capsys.readouterr().out)
     assert [score["episodes"] for score in scores] == [20, 20, 20]
     assert all(0.0 <= score["success"] <= 1.0 for score in scores)
+
+
+def test_models_of_the_docs_fly(tmp_path, monkeypatch, capsys):
+    """The blocks about models of one's own, as the file that they say they are."""
+    text = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
+    section = text[text.index("## Flying a model of your own") : text.index("## Results")]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text("\n\n".join(re.findall(r"```python\n(.*?)```", section, re.DOTALL)))
+    policies = ["mine.py:policy", "safe=mine.py:policy+shield", "mine.py:recurrent"]
+    assert main(["evaluate", "--policies", *policies, "--worlds", "1", "--jobs", "1", "--json"]) == 0
+    ranked = json.loads(capsys.readouterr().out)["missions"][0]["policies"]
+    assert {entry["policy"] for entry in ranked} == {"mine.py:policy", "safe", "mine.py:recurrent"}
+    env = gym.make("HydroneGym/AirToWater-v0", time_limit=3.0)
+    names = {"gym": gym, "env": env}
+    block = text[text.index("## Flying an agent") : text.index("## Flying a model")]
+    exec(compile(re.findall(r"```python\n(.*?)```", block, re.DOTALL)[0], "docs/training.md", "exec"), names)
+    assert callable(names["policy"].predict)

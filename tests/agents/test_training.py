@@ -216,10 +216,23 @@ def test_bad_runs(tmp_path, recipe):
         ("a: [", "no YAML"),
         ("a: 1", "needs an entry"),
         ("HydroneGym/Mission-v0: {n_envs: 4}", "lacks n_timesteps, policy"),
-        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P, policy_kwargs: dict()}", "code is not run"),
-        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P, noise_type: ou}", "must be 'normal', got 'ou'"),
-        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P}\nmissions: {a: 3}", "must sum to n_envs = 4"),
-        ("HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: P}\nenvironment: [7]", r"mapping .* got \[7\]"),
+        (
+            "HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: MlpPolicy, policy_kwargs: dict()}",
+            "code is not run",
+        ),
+        (
+            "HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: MlpPolicy, noise_type: ou}",
+            "unknown key noise_type: known are",
+        ),
+        (
+            "HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: MlpPolicy}\n"
+            "missions: {HydroneGym/AirToWater-v0: 3}",
+            "must sum to n_envs = 4",
+        ),
+        (
+            "HydroneGym/Mission-v0: {n_envs: 4, n_timesteps: 9, policy: MlpPolicy}\nenvironment: [7]",
+            r"mapping .* got \[7\]",
+        ),
     ],
 )
 def test_bad_recipes(tmp_path, text, message):

@@ -74,9 +74,15 @@ def test_writes_rows_summary_and_tables(tmp_path, capsys):
     assert pooled["comparisons"][0]["policy"] == "straight-line-shield"
     markdown = (tmp_path / "tables.md").read_text()
     for name in ("straight-line", "straight-line-shield", "air-to-water", "water-to-air", "all missions"):
-        assert name in out
         assert name in markdown
-    assert out.splitlines()[-3:] == [str(tmp_path / name) for name in ("rows.csv", "summary.json", "tables.md")]
+    assert markdown.count("\n\n- ") == 3 * 5
+    *told, rows, summary, tables, latex = out.splitlines()
+    names = ("rows.csv", "summary.json", "tables.md", "tables.tex")
+    assert [rows, summary, tables, latex] == [str(tmp_path / name) for name in names]
+    assert max(map(len, told)) <= 80
+    assert told[0].strip() == "paper-20-v1, all missions: in short"
+    assert sum(line.startswith("straight-line") for line in told) == 2
+    assert "in tables.md" in told[-1]
 
 
 def test_the_same_command_again_flies_nothing_and_says_the_same(tmp_path, capsys):
@@ -163,6 +169,8 @@ def test_a_stopped_evaluation_goes_on_to_the_same_rows(how, tmp_path, uninterrup
         (["--policies", "gone.py:Mine"], "there is no file"),
         (["--suites", "paper-21"], "no suite 'paper-21': frozen are dense-40-v1"),
         (["--baseline", "ppo"], "--baseline must be one of straight-line, straight-line-shield, got 'ppo'"),
+        (["--width", "column"], "--width and --no-title are about the figures of a --report"),
+        (["--report", "r", "--width", "0.5"], "width must be column, text or from 2 to 20 inches, got 0.5"),
         (["--worlds", "0"], "worlds must be a whole number of at least 1, got 0"),
         (["--seed", "-1"], "seed must be a whole number of at least 0, got -1"),
         (["--jobs", "0"], "jobs must be a whole number of at least 1, at most 1024, got 0"),

@@ -49,6 +49,19 @@ def test_draws_every_figure_and_agrees_with_fly(tmp_path, capsys):
     assert all((tmp_path / name).stat().st_size > 5000 for name in names)
 
 
+def test_figures_for_a_column_without_titles(tmp_path):
+    options = ["fly", "--experiment", "1", "--policy", "straight-line", "--obstacles", "0", "--out", str(tmp_path)]
+    assert cli.main([*options, "--width", "column", "--no-title"]) == 0
+    for name in ("path", "position", "attitude"):
+        content = (tmp_path / f"experiment-1-{name}.pdf").read_bytes()
+        assert b"MediaBox [ 0 0 252 " in content  # 3.5 inches
+
+
+def test_a_width_out_of_range_is_refused(tmp_path, capsys):
+    assert cli.main([*EMPTY, "--width", "30", "--out", str(tmp_path)]) == 2
+    assert "width must be column, text or from 2 to 20 inches, got 30" in capsys.readouterr().err
+
+
 FIGURES = ("path", "position", "attitude", "tree")
 
 

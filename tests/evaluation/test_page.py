@@ -142,7 +142,7 @@ def test_every_link_leads_somewhere(folder, page):
     ids = page.all("id")
     assert len(set(ids)) == len(ids)
     links = page.all("href", "a")
-    assert {"rows.csv", "summary.json", "tables.md", "#replays"} <= set(links)
+    assert {"rows.csv", "summary.json", "tables.md", "tables.tex", "#replays"} <= set(links)
     assert all(link[1:] in ids if link.startswith("#") else (folder / unquote(link)).is_file() for link in links)
 
 
@@ -154,9 +154,10 @@ def test_every_name_and_number_of_the_summary_is_there(folder, page):
         assert document[name] is None or document[name] in page.text
     shown = [[cell.strip() for cell in row] for row in page.rows]
     tables = tables_of(summarise(read_records(folder / "rows.csv"), "good"))
-    assert len(tables) == 12  # two missions, both together, and the other suite: three each
+    assert len(tables) == 3 * 5 + 4  # two missions and both together, and the other suite, without crossings
     for table in tables:
         assert table.title in page.text
+        assert all(note in page.text for note in table.notes)
         assert list(table.heads) in shown
         assert all(list(row) in shown for row in table.rows)
 
@@ -168,8 +169,32 @@ def test_figures_are_there_for_what_there_is(page):
     assert [place.strip() for kind, _, place in words if kind.startswith("Success against")] == ["mine"]
     for kind in ("Time to the goal (s)", "Energy of the rotors (kJ)"):
         assert len([1 for word in words if word[0] == kind]) == 3
-    for kind in ("Least distance to an obstacle (m)", "Lateral speed (m/s)", "Vertical speed (m/s)"):
+    for kind in ("Least clearance (m)", "Lateral speed (m/s)", "Tilt (°)", "Vertical speed (m/s)"):
         assert [place.strip() for word, _, place in words if word == kind] == ["mine, few", "mine, many"]
+
+
+def test_figures_stand_in_the_order_of_the_tables(page):
+    kinds = list(dict.fromkeys(alt.partition(":")[0] for alt in page.all("alt")))
+    crossings = ["Lateral speed (m/s)", "Tilt (°)", "Vertical speed (m/s)"]
+    outcomes = ["Success", "Success against density", "Least clearance (m)"]
+    assert kinds == [
+        *outcomes, *crossings, "Time to the goal (s)", "Energy of the rotors (kJ)", "Times of decisions"
+    ]  # fmt: skip
+
+
+def test_every_figure_is_a_file_for_a_paper(folder, page, tmp_path):
+    shown = page.all("alt")
+    files = sorted(path.name for path in (folder / "figures").iterdir())
+    assert len(files) == 2 * len(shown)
+    assert {f"figures/{name}" for name in files} <= set(page.all("href", "a"))
+    write_report(folder, into=tmp_path, width=3.5, titled=False)
+    for name in (name for name in files if name.endswith(".svg")):
+        there, here = (ET.parse(place / "figures" / name).getroot() for place in (folder, tmp_path))
+        assert "mine" in "".join(there.itertext()) or "dry" in "".join(there.itertext()) or "decisions" in name
+        assert "mine, few" not in "".join(here.itertext())
+        assert here.get("width") == "252pt"
+    drawn = Page(tmp_path / "report.html")
+    assert [a["src"] for t, a in drawn.tags if t == "img"] == [a["src"] for t, a in page.tags if t == "img"]
 
 
 def test_success_against_density_counts_every_flight_once(monkeypatch):

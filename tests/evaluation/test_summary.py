@@ -8,7 +8,7 @@ import pytest
 
 from hydrone_gym.evaluation.statistics import interquartile_mean, wilson_interval
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, summarise
-from hydrone_gym.evaluation.tables import markdown, print_tables, tables_of
+from hydrone_gym.evaluation.tables import latex, markdown, overview, print_tables, tables_of
 from tests.evaluation.test_records import ROW
 
 ENDS = ("GOAL", "COLLISION", "ROUGH_TRANSITION", "TIMEOUT", "OUT_OF_BOUNDS", "DIVERGED")
@@ -46,7 +46,7 @@ def test_a_policy_is_summed_up(records):
     for name in ("time", "energy", "length"):
         assert getattr(quick, name) == interquartile_mean([getattr(row, name) for row in arrived])
     assert quick.clearance == min(row.clearance for row in flown)
-    assert quick.lateral_speed == ROW.lateral_speed
+    assert quick.lateral_speed_max == ROW.lateral_speed
     assert quick.interventions is None
     assert quick.decision_ms_p99 == ROW.decision_ms_p99
 
@@ -55,7 +55,8 @@ def test_what_there_is_none_of_is_none(records):
     (lost,) = [entry for entry in summarise(records)[0].policies if entry.policy == "lost"]
     assert lost.success.value == 0.0
     assert lost.success.low == 0.0
-    assert [lost.time, lost.length, lost.energy, lost.clearance, lost.lateral_speed, lost.tilt] == [None] * 6
+    assert [lost.time, lost.length, lost.energy, lost.clearance, lost.lateral_speed, lost.tilt_max] == [None] * 6
+    assert (lost.crossed, lost.rough) == (0, None)
     (safe,) = [entry for entry in summarise(records)[0].policies if entry.policy == "safe"]
     assert safe.interventions == statistics.fmean(world % 3 for world in range(60))
 
@@ -117,27 +118,108 @@ def test_an_unknown_baseline_is_refused(records):
         summarise(records, baseline="quik")
 
 
+def test_crossings_are_summed_up_over_the_flights_that_crossed():
+    speeds, tilts = (0.1, 0.02, 0.3, 0.04), (0.01, 0.1, 0.0, 0.02)  # the third too fast, the second tilted by 5.7°
+    rows = [record("x", k, lateral_speed=speeds[k], tilt=tilts[k], crossings=1) for k in range(4)]
+    rows.append(record("x", 4, "TIMEOUT", crossings=0, lateral_speed=None, tilt=None))
+    rows.append(record("x", 5, "ROUGH_TRANSITION", lateral_speed=0.2, tilt=0.0, crossings=1))  # at the limit, rounded
+    (summary,) = summarise(rows)
+    (x,) = summary.policies
+    assert x.crossed == 5
+    assert x.rough == (3 / 5, *wilson_interval(3, 5))
+    assert x.lateral_speed == interquartile_mean([*speeds, 0.2])
+    assert x.lateral_speed_max == 0.3
+    assert x.tilt == interquartile_mean([*tilts, 0.0])
+    table = tables_of([summary])[1]
+    low, high = (100.0 * end for end in wilson_interval(3, 5))
+    assert table.title.endswith(": flights that crossed the surface")
+    assert table.rows[0][1:3] == ("5", f"60.0 [{low:.1f}, {high:.1f}]")
+    assert table.rows[0][4] == "0.300"
+    assert table.rows[0][6] == f"{np.degrees(0.1):.2f}"
+    assert "0.2 m/s" in table.notes[0]
+    assert "5°" in table.notes[0]
+    assert len(tables_of(summarise([rows[4]]))) == 3  # nobody crossed
+
+
+def test_what_is_over_all_flights_stands_apart_from_those_that_arrived(records):
+    outcomes, crossings, arrived, decisions, differences = tables_of(summarise(records))
+    assert arrived.title.endswith(": flights that arrived")
+    assert arrived.heads == ("policy", "time (s)", "length (m)", "energy (J)")
+    assert decisions.title.endswith(": decisions of all flights")
+    assert decisions.heads == ("policy", "p50 (ms)", "p99 (ms)")
+    for table, words in (
+        (outcomes, ("Interventions", "Other", "Least clearance", "95 % Wilson interval")),
+        (crossings, ("Rough", "Lateral speed, tilt", "95 % bootstrap interval")),
+        (arrived, ("interquartile mean", "95 % bootstrap interval")),
+        (differences, ("Only it / baseline", "McNemar", "Newcombe's 95 % interval")),
+    ):
+        assert all(any(word in note for note in table.notes) for word in words)
+        assert all(f"\n- {note}\n" in markdown([table]) for note in table.notes)
+
+
+def test_negative_numbers_have_minus_signs_and_zero_has_none():
+    rows = [record("x", k, time=20.0, energy=900.0) for k in range(3)]
+    rows += [record("y", k, time=19.0, energy=899.9, clearance=-0.05) for k in range(3)]
+    outcomes, *_, differences = tables_of(summarise(rows, "x"))
+    assert [row[7] for row in outcomes.rows] == ["−0.05", "0.50"]
+    assert differences.rows[0][5] == "−1.00 [−1.00, −1.00]"
+    assert differences.rows[0][6] == "+0 [+0, +0]"  # not -0
+    assert "-" not in "".join(cell for row in (*outcomes.rows, *differences.rows) for cell in row[1:])
+
+
+def test_an_overview_fits_in_80_columns(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    names = ("straight-line-shield", "clrrt", "ppo-shield", "somewhere/my_policies.py:TheVeryBest+shield")
+    rows = [record(n, k, mission=m, decision_ms_p99=123.4, time=119.9) for n in names for k in range(9) for m in "ab"]
+    (table,) = overview(summarise([*rows, *(replace(row, suite="other", mission="a") for row in rows)]))[:1]
+    print_tables([table])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    shown = [line for line in lines if " [" in line and line[0] not in " p"] + [x for x in lines if x.startswith("ppo")]
+    assert len(shown) == 4  # a line a policy
+    assert all(any(line.startswith(name) for line in shown) for name in names[:3])
+    assert any("somewhere/…" in line and "Best+shield" in line for line in shown)
+    assert "100.0 [82.4, 100.0]" in shown[0]
+    assert "119.9" in shown[0]
+    assert "123.40" in shown[0]
+
+
+def test_latex_has_every_cell_and_escapes_what_would_break_it(records):
+    rows = [record("50%_&#{x}$~^\\", k, clearance=-0.1) for k in range(2)] + [record("b", k) for k in range(2)]
+    text = latex(tables_of(summarise(rows)))
+    assert text.startswith("% \\usepackage{booktabs}\n")
+    name = r"50\%\_\&\#\{x\}\$\textasciitilde{}\textasciicircum{}\textbackslash{}"
+    assert rf"{name} & 2 & 100.0 [34.2, 100.0] & 0 & 0 & 0 & 0 & $-$0.10 & -- \\" in text
+    assert text.count(r"\begin{tabular}") == text.count(r"\toprule") == text.count(r"\bottomrule") == 5
+    assert r"\shortstack[r]{least clear-\\ance (m)}" in text
+    assert r"tilt ($^\circ$)" in text
+    assert text.count("{") == text.count("}")
+    body = [line for line in text.splitlines() if line.endswith(r" \\") and "shortstack" not in line]
+    assert {line.replace(r"\&", "").count(" & ") for line in body} == {8, 6, 3, 2}
+
+
 def test_tables_show_the_figures(records, capsys):
     summaries = summarise(records)
-    outcomes, measures, differences = tables_of(summaries)
+    outcomes, _, measures, decisions, differences = tables_of(summaries)
     (quick,) = [entry for entry in summaries[0].policies if entry.policy == "quick"]
     assert outcomes.rows[0][:3] == ("1. safe", "60", "100.0 [94.0, 100.0]")
     assert outcomes.rows[1][:2] == ("2. quick", "60")
     assert outcomes.rows[1][3:] == (
         *map(str, (quick.collisions, quick.rough_crossings, quick.timeouts, quick.out_of_bounds + quick.diverged)),
-        f"{quick.clearance:.2f}",
-        "-",
+        f"−{-quick.clearance:.2f}",
+        "–",
     )
     assert quick.clearance < 0.0  # of a flight that did not arrive: it stands among the outcomes
     assert not any("clearance" in head for head in measures.heads)
-    assert measures.rows[2] == ("lost", "-", "-", "-", "1.50 / 9.50")
+    assert measures.rows[2] == ("lost", "–", "–", "–")
+    assert decisions.rows[2] == ("lost", "1.50", "9.50")
     time = summaries[0].comparisons[0].time
     assert differences.rows[0][5] == f"{time.value:+.2f} [{time.low:+.2f}, {time.high:+.2f}]"
     text = markdown([outcomes, measures, differences])
     lines = text.splitlines()
     assert lines.count("| 1. safe | 60 | 100.0 [94.0, 100.0] | 0 | 0 | 0 | 0 | 0.50 | 1.0 |") == 1
     for line in lines:
-        assert not line or line.startswith(("| ", "### ", "|---|"))
+        assert not line or line.startswith(("| ", "### ", "|---|", "- "))
     print_tables([outcomes, measures, differences])
     shown = capsys.readouterr().out
     for table in (outcomes, measures, differences):

@@ -16,8 +16,8 @@ from hydrone_gym.rendering.comparison import (
     plot_distributions,
     plot_success,
     shortened,
-    to_svg,
 )
+from hydrone_gym.rendering.files import to_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

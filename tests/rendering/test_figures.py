@@ -11,7 +11,8 @@ from matplotlib.colors import to_rgb
 
 from hydrone_gym import Scenario, World
 from hydrone_gym.rendering import style
-from hydrone_gym.rendering.figures import plot_attitude, plot_path, plot_position, plot_tree, save_figure
+from hydrone_gym.rendering.figures import plot_attitude, plot_path, plot_position, plot_tree
+from hydrone_gym.rendering.files import save_figure
 from hydrone_gym.rendering.paths import crossing_points, dash, split_media
 from hydrone_gym.rendering.scene3d import Scene
 from planners import TreeView
@@ -164,6 +165,51 @@ def test_equal_flights_give_equal_files(dive, tmp_path):
     for suffix in ("png", "pdf"):
         assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
     assert b"CreationDate" not in (tmp_path / "a.pdf").read_bytes()
+
+
+def test_files_hold_real_fonts_and_text(dive, tmp_path):
+    _, path = dive
+    figure = plot_path(path, path[-1], NOTHING, NOTHING, title="Somewhere")
+    pdf, svg = save_figure(figure, tmp_path / "a", formats=("pdf", "svg"))
+    assert b"/Type3" not in pdf.read_bytes()
+    assert b"/CIDFontType2" in pdf.read_bytes()
+    assert ">Somewhere</text>" in svg.read_text()
+
+
+def test_a_width_is_that_of_the_page_and_leaves_text_at_8_points(dive, tmp_path):
+    t, path = dive
+    figure = plot_position(t, path, path, title="Somewhere")
+    png, pdf, svg = save_figure(figure, tmp_path / "a", width=3.5, titled=False, formats=("png", "pdf", "svg"))
+    assert int.from_bytes(png.read_bytes()[16:20], "big") == 3.5 * 400  # pixels
+    assert b"MediaBox [ 0 0 252 " in pdf.read_bytes()
+    text = svg.read_text()
+    assert 'width="252pt"' in text
+    assert 'viewBox="0 0 378 ' in text  # half as wide again, for text of 12 points
+    assert "Somewhere" not in text
+    assert figure.get_figwidth() == 7.6  # as before
+    assert "Somewhere" in save_figure(figure, tmp_path / "b", formats=("svg",))[0].read_text()
+
+
+def extent(image, colour):
+    """Height and width of what has a colour, pixels."""
+    rows, columns = np.nonzero(np.abs(image - to_rgb(colour)).max(axis=-1) < 0.02)
+    return np.ptp(rows), np.ptp(columns)
+
+
+def test_the_radius_of_arrival_is_to_scale(dive):
+    """A circle of a radius is as large as the obstacle of that radius at its place."""
+    centre = (2.0, -3.0, 5.0)
+    ball, ring = (Scene((-10.0, -10.0, -5.0), (10.0, 10.0, 10.0)) for _ in range(2))
+    ball.obstacles(np.array([[*centre, 1.5]]), ("#00ff00", "#00ff00"))
+    ring.circle(centre, 1.5, "#00ff00")
+    np.testing.assert_allclose(extent(pixels(ring.figure), "#00ff00"), extent(pixels(ball.figure), "#00ff00"), atol=5)
+    _, path = dive
+    sizes = []
+    for radius in (1.0, 2.0):
+        figure = plot_path(path, (5.0, 5.0, 6.0), NOTHING, NOTHING, world=World(goal_radius=radius))
+        sizes.append(extent(pixels(figure), style.PURPLE))
+        assert f"arrival ({radius:g} m)" in [text.get_text() for text in figure.legends[0].get_texts()]
+    np.testing.assert_allclose(sizes[1], 2.0 * np.array(sizes[0]), atol=5)
 
 
 def test_matplotlib_is_loaded_only_to_draw():
