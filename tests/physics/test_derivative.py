@@ -55,7 +55,12 @@ def test_surface_belongs_to_the_water():
         (np.zeros(12), np.zeros(3), "paper", r"rotor_speed must have shape \(4,\), got \(3,\)"),
         (np.full(12, np.nan), np.zeros(4), "paper", "state must be finite"),
         (np.zeros(12), np.full(4, np.inf), "paper", "rotor_speed must be finite"),
-        (np.zeros(12), np.zeros(4), "boat", "vehicle must be one of 'paper', 'physical', 'hydrone-2021' or a Vehicle, got 'boat'"),
+        (
+            np.zeros(12),
+            np.zeros(4),
+            "boat",
+            "vehicle must be one of 'paper', 'physical', 'hydrone-2021' or a Vehicle, got 'boat'",
+        ),
     ],
 )
 def test_bad_input_is_named(state, rpm, vehicle, message):
