@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from agents.training import Flown
 
 INTERRUPTED = 130  # what shells give for Ctrl-C
-_Mission = Literal["mission", "air-to-water", "water-to-air"]
+_Mission = Literal["random", "air-to-water", "water-to-air"]
 _IDS = dict(zip(get_args(_Mission), MISSIONS, strict=True))
 _Vehicle = Literal["paper", "physical"]
 
@@ -137,7 +137,10 @@ class Demonstrate:
 
 @dataclass(frozen=True, kw_only=True)
 class Failures:
-    """Fly an agent in many held-out worlds, and say where and why it fails: tables, failures.csv and figures."""
+    """Fly an agent in many held-out worlds, and say where and why it fails.
+
+    Writes tables, failures.csv and figures.
+    """
 
     # Name of a shipped agent, or a folder; for comparison also a registered policy such as straight-line.
     agent: str
