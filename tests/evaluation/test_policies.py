@@ -148,7 +148,7 @@ def test_a_name_registered_by_another_package(tmp_path, env, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("clrt", "no policy 'clrt': known are clrrt, clrrt-published"),
+        ("clrt", "no policy 'clrt' (did you mean 'clrrt'?): known are clrrt, clrrt-published"),
         ("my_policies", "no policy 'my_policies'"),
         ("my_policies:", "no policy 'my_policies:'"),
         (":Still", "no policy ':Still'"),
