@@ -24,7 +24,6 @@ from hydrone_gym.evaluation.policies import did_you_mean
 from hydrone_gym.evaluation.run import EvaluationStopped
 
 GROUP = "hydrone_gym.commands"
-INTERRUPTED = 130  # what shells give for Ctrl-C
 MOST_OBSTACLES = 1000  # of an option; more take minutes to place
 
 
@@ -34,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _main(sys.argv[1:] if arguments is None else list(arguments))
     except KeyboardInterrupt:
         print("hydrone: interrupted; the same command begins again", file=sys.stderr)
-        return INTERRUPTED
+        return 130  # what shells give for Ctrl-C
 
 
 def _main(given: list[str]) -> int:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from gymnasium.error import DependencyNotInstalled
 
-from hydrone_gym.cli import INTERRUPTED, refused
+from hydrone_gym.cli import refused
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
@@ -19,6 +19,8 @@ from hydrone_gym.evaluation.shown import Writer
 from hydrone_gym.evaluation.tables import print_tables
 from hydrone_gym.rendering.files import Width, inches
 from hydrone_gym.rendering.replay import load_viser, write_replay
+
+INTERRUPTED = 130  # what shells give for Ctrl-C
 
 
 @dataclass(frozen=True, kw_only=True)
