@@ -7,6 +7,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import gymnasium
 import pytest
 
 import hydrone_gym
@@ -15,6 +16,7 @@ from hydrone_gym.cli import main
 from hydrone_gym.cli.missions import MissionOptions
 from hydrone_gym.evaluation.policies import find_policy
 from hydrone_gym.evaluation.suites import load_suite
+from planners import Shield
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -96,6 +98,7 @@ def test_list_names_what_commands_take(capsys):
         load_suite(suite, 1)
     for agent in names["agents"]:
         load_agent(agent)
+        assert agent in names["policies"]
     for mission in names["missions"]:
         assert MissionOptions(mission=mission, policy="straight-line", obstacles=0).prepare()[0].name == mission
 
@@ -112,6 +115,19 @@ def test_tables_name_what_commands_take():
 def test_a_mission_has_a_name_and_the_id_of_its_environment(mission):
     (prepared,) = MissionOptions(mission=mission, policy="straight-line", obstacles=0).prepare()
     assert prepared.name == ("random" if mission == "random" else "air-to-water")
+
+
+@pytest.mark.parametrize("options", [[], ["--shield"]])
+def test_an_agent_of_a_name_flies_the_same_wherever_it_is_named(options, tmp_path, monkeypatch):
+    """`ppo-shield` is behind the shield, once, as `hydrone evaluate` flies it."""
+    flown = []
+    report = "agents.failures.report.write_failure_report"
+    monkeypatch.setattr(report, lambda agent, *_, **__: flown.append(agent) or ("", {}))
+    assert main(["failures", "--agent", "ppo-shield", "--out", str(tmp_path), *options]) == 0
+    env = gymnasium.make("HydroneGym/Mission-v0")
+    shield = find_policy(flown[0]).make(env, 0)
+    assert isinstance(shield, Shield)
+    assert shield.policy.file.name == "ppo-shield"
 
 
 def test_version_and_module(capsys):

@@ -69,7 +69,7 @@ def test_every_registered_name_makes_its_policy_for_the_environment(env):
     assert find_policy("clrrt").make(env, 7).seed == 7
     assert find_policy("clrrt").make(env, 7).simulation.vehicle == env.unwrapped.vehicle
     shielded = find_policy("ppo-shield").make(env, 0)
-    assert shielded.policy.file.name == "ppo_shielded"
+    assert shielded.policy.file.name == "ppo-shield"
     assert shielded.simulation.vehicle == env.unwrapped.vehicle
     assert type(find_policy("straight-line-shield").make(env, 0).policy) is StraightLine
 
