@@ -38,7 +38,7 @@ class Fly(MissionOptions):
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
-        inches(self.width)
+        inches(self.width)  # raises before anything is flown
         missions, folder = self.prepare(), self._folder()
         with held(folder):
             self._check(folder)

@@ -52,10 +52,20 @@ def test_draws_every_figure_and_agrees_with_fly(tmp_path, capsys):
 
 
 def test_figures_for_a_column_without_titles(tmp_path):
-    options = ["fly", "--experiment", "1", "--policy", "straight-line", "--obstacles", "0", "--out", str(tmp_path)]
+    options = [
+        "fly",
+        "--mission",
+        "air-to-water",
+        "--policy",
+        "straight-line",
+        "--obstacles",
+        "0",
+        "--out",
+        str(tmp_path),
+    ]
     assert cli.main([*options, "--width", "column", "--no-title"]) == 0
     for name in ("path", "position", "attitude"):
-        content = (tmp_path / f"experiment-1-{name}.pdf").read_bytes()
+        content = (tmp_path / f"air-to-water-straight-line-seed-0-{name}.pdf").read_bytes()
         assert b"MediaBox [ 0 0 252 " in content  # 3.5 inches
 
 
@@ -274,12 +284,12 @@ def test_a_folder_holds_one_run(tmp_path, capsys, monkeypatch):
 def test_titles_name_policy_and_seed(tmp_path, monkeypatch):
     titles = []
     monkeypatch.setattr(
-        "hydrone_gym.rendering.figures.save_figure",
-        lambda figure, path: titles.extend([axes.get_title() for axes in figure.axes] + [figure.get_suptitle()]) or [],
+        "hydrone_gym.evaluation.flight_figures.save_figure",
+        lambda figure, path, **look: titles.extend(text.get_text() for text in figure.texts) or [],
     )
     options = ["--mission", "random", "--policy", "straight-line", "--obstacles", "0", "--seed", "3"]
     assert cli.main(["fly", *options, "--out", str(tmp_path)]) == 0
-    assert [title[:30] for title in titles if title] == ["Random, straight-line, seed 3:"] * 3
+    assert [title[:30] for title in titles] == ["Random, straight-line, seed 3:"] * 3
 
 
 def test_ctrl_c_gives_130_and_a_line(tmp_path, capsys, monkeypatch):
