@@ -122,7 +122,7 @@ def test_an_agent_of_a_name_flies_the_same_wherever_it_is_named(options, tmp_pat
     """`ppo-shield` is behind the shield, once, as `hydrone evaluate` flies it."""
     flown = []
     report = "agents.failures.report.write_failure_report"
-    monkeypatch.setattr(report, lambda agent, *_, **__: flown.append(agent) or ("", {}))
+    monkeypatch.setattr(report, lambda agent, *_, **__: flown.append(agent) or ([], {}))
     assert main(["failures", "--agent", "ppo-shield", "--out", str(tmp_path), *options]) == 0
     env = gymnasium.make("HydroneGym/Mission-v0")
     shield = find_policy(flown[0]).make(env, 0)
