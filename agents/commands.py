@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from agents.training import Flown
 
 INTERRUPTED = 130  # what shells give for Ctrl-C
-_Mission = Literal["mission", "air-to-water", "water-to-air"]
+_Mission = Literal["random", "air-to-water", "water-to-air"]
 _IDS = dict(zip(get_args(_Mission), MISSIONS, strict=True))
 _Vehicle = Literal["paper", "physical"]
 
@@ -27,8 +27,8 @@ class Train:
     EXTRA: ClassVar = "agents"
     _TRAINED: ClassVar = ("algorithm", "out", "seed", "steps", "recipe", "start_from", "obstacles", "vehicle")
 
-    # Recipe; ppo_shielded goes on behind the shield and wants --start-from.
-    algorithm: Annotated[Literal["ppo", "ppo_shielded", "sac", "td3", "tqc"], tyro.conf.Positional] = "ppo"
+    # Recipe; ppo-shield goes on behind the shield and wants --start-from.
+    algorithm: Annotated[Literal["ppo", "ppo-shield", "sac", "td3", "tqc"], tyro.conf.Positional] = "ppo"
     out: Path | None = None  # Run folder, runs/<algorithm>-<seed> unless given; must not hold a run already.
     seed: int = 0  # Seed of weights, missions and exploration.
     steps: int | None = None  # Transitions to learn from, the recipe's number unless given.
@@ -78,8 +78,8 @@ class Train:
         """Train a new run; return how the agent flew."""
         from agents.training import TrainingRun, train
 
-        if self.algorithm == "ppo_shielded" and self.start_from is None:
-            raise ValueError("ppo_shielded goes on with weights trained without the shield: name their --start-from")
+        if self.algorithm == "ppo-shield" and self.start_from is None:
+            raise ValueError("ppo-shield goes on with weights trained without the shield: name their --start-from")
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "vehicle": self.vehicle}
         return train(
@@ -137,7 +137,10 @@ class Demonstrate:
 
 @dataclass(frozen=True, kw_only=True)
 class Failures:
-    """Fly an agent in many held-out worlds, and say where and why it fails: tables, failures.csv and figures."""
+    """Fly an agent in many held-out worlds, and say where and why it fails.
+
+    Writes tables, failures.csv and figures.
+    """
 
     # Name of a shipped agent, or a folder; for comparison also a registered policy such as straight-line.
     agent: str
@@ -158,7 +161,7 @@ class Failures:
         check_obstacles(self.obstacles)
         options = {"num_obstacles": self.obstacles, "obstacle_radius": self.radii, "vehicle": self.vehicle}
         behind = "+shield" if self.shield else ""
-        folder = f"={PRETRAINED / self.agent}{behind}" if self.agent in shipped_agents() else ""
+        folder = f"={PRETRAINED / self.agent}{behind}" if self.shield and self.agent in shipped_agents() else ""
         tables, document = write_failure_report(
             f"{self.agent}{behind}{folder}", self.out, worlds=self.episodes, options=options, progress=not self.json
         )

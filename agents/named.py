@@ -13,7 +13,7 @@ from_folder = load_agent
 
 def ppo_shield(env: Any) -> Shield:
     """Return the agent whose training went on behind the shield, behind it."""
-    return Shield.for_env(load_agent("ppo_shielded", env), env)
+    return Shield.for_env(load_agent("ppo-shield", env), env)
 
 
 def sac_shield(env: Any) -> Shield:

@@ -28,7 +28,7 @@ from benchmarks.timing import RESULTS, save
 from benchmarks.world_shapes import SHAPES
 from hydrone_gym.evaluation import evaluate_held_out
 
-BEGINS_WITH = {"ppo_shielded": "ppo"}  # recipe: the one whose weights of the same seed it goes on from
+BEGINS_WITH = {"ppo-shield": "ppo"}  # recipe: the one whose weights of the same seed it goes on from
 DENSE = SHAPES["40 larger spheres"]
 LEARNT = 0.95  # success while exploring, the mean of a curve's last `WINDOW` lines
 WINDOW = 5
@@ -39,7 +39,7 @@ UNSAFE = tuple(name for name in FAILURES if name != "TIMEOUT")
 class Arguments:
     """What to train and evaluate."""
 
-    recipes: tuple[str, ...] = ("ppo", "ppo_shielded", "sac")
+    recipes: tuple[str, ...] = ("ppo", "ppo-shield", "sac")
     """Names of recipes of the package."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Seeds of the trainings."""
@@ -124,7 +124,7 @@ def sheets(measured: dict[str, Any]) -> list[Sheet]:
         ("recipe", "worlds", "mission", f"seeds {seeds}, %", "mean ± deviation, %", "collisions, out, rough, diverged"),
         rows,
         [
-            f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo_shielded` behind the "
+            f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo-shield` behind the "
             "shield, the others alone. The last column counts flights of all seeds. "
             f"{DENSE.name}: {DENSE.radii[0]}–{DENSE.radii[1]} m."
         ],

@@ -1,11 +1,13 @@
 """Environments and tools for the HyDrone, a hybrid vehicle that flies, dives and crosses the water surface smoothly.
 
 Importing this package registers `HydroneGym/AirToWater-v0`, `HydroneGym/WaterToAir-v0` and `HydroneGym/Mission-v0` with
-Gymnasium; `hydrone_gym.envs.HydroneEnv` documents them.
+Gymnasium; `hydrone_gym.envs.HydroneEnv` documents them. `gymnasium.make("hydrone_gym:HydroneGym/Mission-v0")` imports
+it by itself.
 """
 
 from gymnasium.envs.registration import register
 
+from hydrone_gym import _aliases as _aliases
 from hydrone_gym.physics.dynamics import state_derivative
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.vehicle import HYDRONE, HYDRONE_2021, HYDRONE_PHYSICAL, AirGains, Vehicle, WaterGains

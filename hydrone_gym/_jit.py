@@ -8,25 +8,30 @@ cache. Three rules hold everywhere and are the reason for this file:
 * the cache is keyed by the source of a kernel's module and of every module that one imports. Numba's stock cache looks
   only at the file of the outermost function and goes stale when a function it inlines is edited in another file.
 
+A cache that cannot be used costs time, never a result: kernels are then compiled anew, and one line says why.
+
 Kernels read and write what they work on through `hydrone_gym._memory`.
 """
 
 import contextlib
 import functools
 import hashlib
+import logging
 import os
+import pickle
 import re
+import stat
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 from numba.core import sigutils
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.extending import register_jitable
 
@@ -76,19 +81,54 @@ def _fingerprint(*modules: str) -> str:
     return digest.hexdigest()[:16]
 
 
+def _folders() -> Iterator[Path]:
+    """Yield where compiled kernels may be kept, made if missing; OSError where that fails."""
+    with contextlib.suppress(RuntimeError):  # an account without a home
+        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hydrone_gym"
+        with contextlib.suppress(OSError):
+            home.mkdir(parents=True, exist_ok=True)
+            yield home
+    owner = os.getuid() if hasattr(os, "getuid") else 0
+    shared = Path(tempfile.gettempdir()) / f"hydrone_gym-{owner}"
+    shared.mkdir(mode=0o700, exist_ok=True)
+    found = shared.lstat()  # what is stored is executed, and anybody could have put this here before
+    if os.name == "posix" and not (stat.S_ISDIR(found.st_mode) and found.st_uid == owner and not found.st_mode & 0o022):
+        raise PermissionError(f"{shared} must be a folder of yours that nobody else may write")
+    yield shared
+
+
 @functools.cache
 def cache_root() -> Path | None:
     """A writable directory for compiled kernels, or None when there is none (then nothing is cached)."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hydrone_gym"
-    owner = os.getuid() if hasattr(os, "getuid") else 0
-    for candidate in (home, Path(tempfile.gettempdir()) / f"hydrone_gym-{owner}"):
-        try:
-            candidate.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(candidate, os.W_OK):
-            return candidate
+    reason = "no folder is writable"
+    try:
+        for folder in _folders():
+            if os.access(folder, os.W_OK | os.X_OK):
+                return folder
+    except OSError as error:
+        reason = str(error)
+    _tell(f"kernels are not cached, each process compiles them anew: {reason}")
     return None
+
+
+@functools.cache
+def _tell(line: str) -> None:
+    """Log a warning, which goes to stderr unless the user says otherwise; the same one once."""
+    logging.getLogger("hydrone_gym").warning("hydrone_gym: %s", line)
+
+
+class _CheckedFile(IndexDataCacheFile):
+    """Cache files whose machine code is compared with its hash: damaged code would end the process."""
+
+    def _save_data(self, name: str, data: Any) -> None:
+        content = self._dump(data)
+        super()._save_data(name, (hashlib.sha256(content).digest(), content))
+
+    def _load_data(self, name: str) -> Any:
+        digest, content = super()._load_data(name)
+        if hashlib.sha256(content).digest() != digest:
+            raise ValueError(f"{name} is not what was written")
+        return pickle.loads(content)
 
 
 class _SharedCache(FunctionCache):
@@ -97,21 +137,36 @@ class _SharedCache(FunctionCache):
     def __init__(self, function: Callable) -> None:
         """Begin without the lock."""
         super().__init__(function)
+        self._cache_file.__class__ = _CheckedFile
         self._lock: Any = None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what is stored; if nothing is, hold the lock until it is, or wait for who holds it."""
-        found = super().load_overload(sig, target_context)
+        found = self._stored(sig, target_context)
         if found is None and self._acquire():
-            found = super().load_overload(sig, target_context)
+            found = self._stored(sig, target_context)
             if found is not None:
                 self.release()
         return found
 
+    def _stored(self, sig: Any, target_context: Any) -> Any:
+        """Return what is stored, None if there is nothing or only something damaged, which is forgotten."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # reading what is damaged may raise anything
+            _tell(f"kernels are compiled anew, their cache {cache_root()} is damaged: {type(error).__name__}: {error}")
+        try:
+            self.flush()
+        except OSError:
+            self.disable()
+        return None
+
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Store a function and let the others have it."""
+        """Store a function, where that can be done, and let the others have it."""
         try:
             super().save_overload(sig, data)
+        except OSError as error:
+            _tell(f"kernels cannot be cached in {cache_root()}: {error.strerror or error}")
         finally:
             self.release()
 
@@ -157,15 +212,23 @@ def _releasing(compile_it: Callable, cache: _SharedCache) -> Callable:
 def _cached(compiled: Any, function: Callable, *modules: str) -> Any:
     """Let a compiled function keep its machine code on disk, under the fingerprint of modules."""
     root = cache_root()
-    if root is not None:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(root / _fingerprint(*modules))
-        try:
-            compiled._cache = _SharedCache(function)
-        finally:
-            numba.config.CACHE_DIR = before
-        compiler = getattr(compiled, "_compiler", compiled)
-        compiler.compile = _releasing(compiler.compile, compiled._cache)
+    if root is None:
+        return compiled
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(root / _fingerprint(*modules))
+    try:
+        cache = _SharedCache(function)
+        usable = Path(cache.cache_path).is_relative_to(root)  # Numba's own folders go stale
+    except RuntimeError:
+        usable = False
+    finally:
+        numba.config.CACHE_DIR = before
+    if not usable:
+        _tell(f"kernels cannot be cached below {root}: nothing can be written there")
+        return compiled
+    compiled._cache = cache
+    compiler = getattr(compiled, "_compiler", compiled)
+    compiler.compile = _releasing(compiler.compile, cache)
     return compiled
 
 

@@ -4,8 +4,8 @@ A subcommand is a class whose fields are the options, explained by the comment o
 returns the exit code; the first line of its docstring is what `hydrone --help` shows, and an extra that it needs is its
 class variable `EXTRA`. Only the one asked for is imported.
 
-Exit codes: 0 success; 1 a mission that did not end at the goal, or an evaluation that could not be finished; 2 bad
-input, told in one line; 130 an evaluation stopped by Ctrl-C.
+Exit codes: 0 success; 1 a mission that did not end at the goal, or what could not be finished or written; 2 bad
+input, told in one line; 130 stopped by Ctrl-C.
 """
 
 import functools
@@ -19,6 +19,8 @@ from typing import Any
 
 from gymnasium.error import DependencyNotInstalled
 
+from hydrone_gym import __version__
+from hydrone_gym.evaluation.policies import did_you_mean
 from hydrone_gym.evaluation.run import EvaluationStopped
 
 GROUP = "hydrone_gym.commands"
@@ -27,8 +29,19 @@ MOST_OBSTACLES = 1000  # of an option; more take minutes to place
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `arguments` default to those of the process."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        return _main(sys.argv[1:] if arguments is None else list(arguments))
+    except KeyboardInterrupt:
+        print("hydrone: interrupted; the same command begins again", file=sys.stderr)
+        return 130  # what shells give for Ctrl-C
+
+
+def _main(given: list[str]) -> int:
+    """Find the subcommand, run it and return its exit code."""
     commands = {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name)}
+    if given == ["--version"]:
+        print("hydrone", __version__)
+        return 0
     if not given or given[0] not in commands:
         return _help(commands, given)
     import tyro
@@ -50,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refused(f'{error}; this needs: pip install "hydrone-gym[{extra}]"' if extra else error)
     except EvaluationStopped as error:
         return refused(error, 1)
-    except (ValueError, TypeError, OSError, DependencyNotInstalled) as error:
+    except (ValueError, TypeError, OSError, MemoryError, DependencyNotInstalled) as error:
         return refused(error)
     return code
 
@@ -90,9 +103,9 @@ def check_obstacles(count: int | None) -> None:
 
 def _help(commands: dict[str, EntryPoint], given: list[str]) -> int:
     """Print what subcommands there are; raise SystemExit if one was asked for that is not among them."""
-    usage = "usage: hydrone [-h] COMMAND …"
+    usage = "usage: hydrone [-h] [--version] COMMAND …"
     if not given or given[0] not in ("-h", "--help"):
-        wrong = f"no command {given[0]!r}" if given else "a command is missing"
+        wrong = f"no command {given[0]!r}{did_you_mean(given[0], commands)}" if given else "a command is missing"
         print(f"{usage}\nhydrone: error: {wrong}: known are {', '.join(commands)}", file=sys.stderr)
         raise SystemExit(2)
     print(f"{usage}\n\nFly the HyDrone in air, through the water surface and below it.\n\ncommands:")
@@ -101,6 +114,6 @@ def _help(commands: dict[str, EntryPoint], given: list[str]) -> int:
             about = (inspect.getdoc(entry.load()) or "").partition("\n")[0]
         except Exception as error:
             about = f"cannot be loaded: {type(error).__name__}: {error}"
-        print(textwrap.fill(about, 100, initial_indent=f"  {name:<14}", subsequent_indent=" " * 16))
+        print(textwrap.fill(about, 80, initial_indent=f"  {name:<14}", subsequent_indent=" " * 16))
     print("\n`hydrone COMMAND --help` lists the options of a command.")
     return 0

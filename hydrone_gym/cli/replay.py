@@ -13,7 +13,8 @@ import gymnasium as gym
 import numpy as np
 import tyro
 
-from hydrone_gym.cli.missions import MissionOptions
+from hydrone_gym.cli import refused
+from hydrone_gym.cli.missions import MISSIONS, MissionOptions, title_of
 from hydrone_gym.evaluation.flight import Flight, fly
 from hydrone_gym.evaluation.plan import plan_of
 from hydrone_gym.evaluation.policies import Policy, PolicySource, find_policy, known_policies
@@ -42,14 +43,16 @@ class Take(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Replay(MissionOptions):
-    """Write a flight as a page that plays in a browser, offline: a fresh flight, a saved one, one of an evaluation."""
+    """Write a flight as a page that plays in a browser, offline.
+
+    Of an evaluation, --mission, --policy and --world are those of its tables.
+    """
 
     saved: tyro.conf.Positional[Path | None] = None
     """A flight.json of `hydrone fly`, or the folder of an evaluation; without it, a fresh flight."""
     flight: str | None = None  # Of a flight.json: only the flight of this name.
     suite: str | None = None  # Of an evaluation: the suite, if there are several.
-    mission: str | None = None  # Of an evaluation: the mission, if there are several.
-    world: int | None = None  # Of an evaluation: the number of the world; --policy is the name in its tables.
+    world: int | None = None  # Of an evaluation: the number of the world.
     out: Path = Path("replay.html")  # File to write, or folder for it; for several flights their names are appended.
     open: bool = False  # Open the page in the browser.
     json: bool = False  # Print one JSON document instead of the names of the files.
@@ -62,7 +65,10 @@ class Replay(MissionOptions):
         out.parent.mkdir(parents=True, exist_ok=True)
         for name, title, flight, simulation, trees in takes:
             page = out if len(takes) == 1 else out.with_name(f"{out.stem}-{name}.html")
-            write_replay(flight, simulation, page, title=title, trees=trees)
+            try:
+                write_replay(flight, simulation, page, title=title, trees=trees)
+            except OSError as error:  # a full disk, after the input was found good
+                return refused(error, 1)
             facts = {"outcome": flight.outcome.name, "time": flight.time, "trees": sum(len(t.edges) > 0 for t in trees)}
             shown.append({"name": name, "title": title, "page": str(page), **facts})
             pages.append(page)
@@ -102,8 +108,8 @@ class Replay(MissionOptions):
         for mission in self.prepare():
             recorder = tree_recorder(mission.policy)
             flight = fly(mission.env, recorder, seed=self.seed, scenario=mission.scenario)
-            title, simulation = _title(mission.name, self.policy, self.seed), mission.env.get_wrapper_attr("simulation")
-            takes.append(Take(mission.name, title, flight, simulation, recorder.trees))
+            simulation = mission.env.get_wrapper_attr("simulation")
+            takes.append(Take(mission.name, mission.title, flight, simulation, recorder.trees))
         return takes
 
     def _evaluated(self, folder: Path) -> Take:
@@ -142,7 +148,7 @@ def _restored(saved: SavedFlight) -> Take:
 
     There are none where the policy is not a registered one or flies otherwise now.
     """
-    env = gym.make("HydroneGym/Mission-v0", num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
+    env = gym.make(MISSIONS["random"], num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
     simulation = env.get_wrapper_attr("simulation")
     flight, trees = restore(saved, simulation), ()
     if saved.policy in known_policies():
@@ -152,14 +158,10 @@ def _restored(saved: SavedFlight) -> Take:
             trees = recorder.trees
         else:
             print(f"hydrone: {saved.name}: shown without trees: {saved.policy} flies otherwise now", file=sys.stderr)
-    return Take(saved.name, _title(saved.name, saved.policy, saved.seed), flight, simulation, trees)
+    return Take(saved.name, title_of(saved.name, saved.policy, saved.seed), flight, simulation, trees)
 
 
 def tree_recorder(policy: Policy) -> Any:
     """Wrap a policy so that its trees are kept, as `trees`: by what a package has registered for it."""
     (recorder,) = entry_points(group=RECORDERS, name="trees")
     return recorder.load()(policy)
-
-
-def _title(name: str, policy: str, seed: int) -> str:
-    return f"{name[:1].upper()}{name[1:].replace('-', ' ')}, {policy}, seed {seed}"

@@ -59,19 +59,20 @@ def draw_flight(
     directory: Path,
     name: str,
     *,
+    title: str = "",
     width: float | None = None,
     titled: bool = True,
 ) -> list[Path]:
     """Write path, position and attitude of a flight as PNG and PDF; return the paths.
 
     `simulation` is that of the environment it was flown in; `name` begins the name of every file in the existing
-    `directory`, and with a capital letter every title. `width` (inches) is that of a paper's column.
+    `directory`, and `title` every title; unless given, that is the name. `width` (inches) is that of a paper's column.
     """
     from hydrone_gym.rendering.figures import WIDTH, plot_attitude, plot_path, plot_position
 
     times, states, references = flight.trace
     world, position, wanted = simulation.world, states[:, :3], attitude_references(simulation, flight.trace)
-    title, zone = name[:1].upper() + name[1:].replace("-", " "), world.zone
+    title, zone = title or name[:1].upper() + name[1:].replace("-", " "), world.zone
     ending = f"{title}: {flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"
     spheres = (flight.detected, flight.undetected)
     look: dict[str, Any] = {"world": world, "width": drawn_width(width, WIDTH), "title": ending}

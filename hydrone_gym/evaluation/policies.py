@@ -6,6 +6,7 @@ agents, (folder, environment) -> policy, under `hydrone_gym.policy_folders`, by 
 what can be put around a policy, (policy, environment) -> policy, under `hydrone_gym.policy_wrappers`.
 """
 
+import difflib
 import importlib
 import importlib.util
 import inspect
@@ -111,6 +112,11 @@ def known_policies() -> list[str]:
     return sorted({entry.name for entry in entry_points(group=_NAMES)})
 
 
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """Return words that ask for the known name most like what was given; none where no name is."""
+    return "".join(f" (did you mean {name!r}?)" for name in difflib.get_close_matches(given, list(known), 1))
+
+
 def find_policy(text: str) -> PolicySource:
     """Find what a user means by a policy.
 
@@ -132,7 +138,7 @@ def find_policy(text: str) -> PolicySource:
     place, colon, attribute = given.rpartition(":")
     if not colon or not place or not attribute:
         raise ValueError(
-            f"no policy {given!r}: known are {', '.join(known_policies())}; "
+            f"no policy {given!r}{did_you_mean(given, known_policies())}: known are {', '.join(known_policies())}; "
             "or give module:attribute, file.py:attribute, or the folder of a trained agent"
         )
     factory, search = given, str(Path.cwd())

@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from hydrone_gym._whole_file import whole
 from hydrone_gym.evaluation.plan import Plan
 from hydrone_gym.evaluation.provenance import commit, machine, versions
 from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, read_records, to_line
@@ -178,10 +179,5 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
 
 def write_whole(path: Path, text: str) -> None:
     """Write a text; the file appears whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    try:
+    with whole(path) as part:
         part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise

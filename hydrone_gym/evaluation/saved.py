@@ -84,7 +84,7 @@ def read_flights(path: str | Path) -> list[SavedFlight]:
         raise ValueError(f'{path}: must be a file "{FORMAT}" of version {VERSION}, got {found[0]!r}, {found[1]!r}')
     try:
         flights = [_flight(record, document) for record in document["flights"]]
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, OverflowError) as error:
         lacks = "lacks " if isinstance(error, KeyError) else ""
         raise ValueError(f"{path}: damaged: {lacks}{error}") from None
     if not flights:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from hydrone_gym._whole_file import whole
 from hydrone_gym.rendering import style
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ def save_figure(
 
     With a width (inches) it is laid out for it, its text of 8 points. Equal figures give equal files. The folder must
     exist.
+
+    Raises OSError naming the file that cannot be written.
     """
     written = [Path(f"{path}.{suffix}") for suffix in formats]
     scale, dots = (1.0, style.DOTS_PER_INCH) if width is None else (_PAPER, _PAPER_DOTS)
@@ -54,13 +57,14 @@ def save_figure(
         text.set(visible=titled, in_layout=titled)
     figure.set_figwidth(drawn_width(width, before))
     for target in written:
-        if target.suffix == ".svg":
-            target.write_text(to_svg(figure, target.stem, scale), encoding="utf-8")
-        elif target.suffix == ".pdf":
-            with style.applied():
-                _write_pdf(figure, target, scale)
-        else:
-            figure.savefig(target, dpi=scale * dots, pil_kwargs={"dpi": (dots, dots)})
+        with whole(target) as file:
+            if target.suffix == ".svg":
+                file.write_text(to_svg(figure, target.stem, scale), encoding="utf-8")
+            elif target.suffix == ".pdf":
+                with style.applied():
+                    _write_pdf(figure, file, scale)
+            else:
+                figure.savefig(file, dpi=scale * dots, pil_kwargs={"dpi": (dots, dots)})
     figure.set_figwidth(before)
     for text in figure.texts:
         text.set(visible=True, in_layout=True)

@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
+from hydrone_gym._whole_file import whole
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import FIELD_OF_VIEW, beside
 from hydrone_gym.rendering.stage import DETECTED, GRID, UNKNOWN, VEHICLE_SCALE, Stage
@@ -106,7 +107,9 @@ def write_replay(
             stage.show(moment)
             recording.insert_sleep(HOLD if moment is last else TICK)
         page = recording.as_html()
-    file.write_text(_dressed(page, title, last, simulation.world, poses, trees=bool(trees)), encoding="utf-8")
+    page = _dressed(page, title, last, simulation.world, poses, trees=bool(trees))
+    with whole(file) as part:
+        part.write_text(page, encoding="utf-8")
 
 
 def _camera_poses(moment: Moment, world: World) -> list[_Fitted]:

@@ -123,7 +123,7 @@ def test_a_file_of_the_user_flies_by_every_command(tmp_path, monkeypatch, capsys
     assert main(["evaluate", "--suites", "paper-20", *options]) == 0
     missions = json.loads(capsys.readouterr().out)["missions"]
     assert {policy["policy"] for policy in missions[0]["policies"]} == {"x", "y"}
-    assert main(["fly", "--policy", "mine.py:policy", "--experiment", "1", "--no-figures", "--json"]) in (0, 1)
+    assert main(["fly", "--policy", "mine.py:policy", "--mission", "air-to-water", "--no-figures", "--json"]) in (0, 1)
     env = gym.make(ID, **SHORT)
     assert isinstance(find_policy("mine.py:policy+shield").make(env, 0), Shield)
 

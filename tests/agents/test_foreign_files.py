@@ -232,7 +232,10 @@ def test_a_folder_that_is_no_agent_is_told_in_one_line(folder, capsys, monkeypat
     harm, message = FOREIGN[case]
     harm(folder)
     assert (
-        main(["fly", "--policy", str(folder), "--experiment", "1", "--no-figures", "--out", str(tmp_path / "o")]) == 2
+        main(
+            ["fly", "--policy", str(folder), "--mission", "air-to-water", "--no-figures", "--out", str(tmp_path / "o")]
+        )
+        == 2
     )
     printed = capsys.readouterr()
     (line,) = [line for line in printed.err.splitlines() if "compiling" not in line]

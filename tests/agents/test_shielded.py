@@ -62,7 +62,7 @@ def test_random_actions_are_kept_safe_where_they_are_not_without():
 
 
 def test_the_packaged_recipes():
-    bare, shielded = load_recipe("ppo"), load_recipe("ppo_shielded")
+    bare, shielded = load_recipe("ppo"), load_recipe("ppo-shield")
     assert (bare.shield, shielded.shield) == (False, True)
     assert shielded.missions == bare.missions
     assert shielded.settings["policy_kwargs"] == bare.settings["policy_kwargs"]

@@ -35,7 +35,7 @@ def test_train_then_shield_then_resume(tmp_path, recipe, capsys):
     assert load_agent(first / "agent").file.algorithm == "PPO"
 
     recipe.write_text(yaml.safe_dump({**SMALL, "shield": True}))
-    assert main(["train", "ppo_shielded", "--start-from", str(first), "--out", str(second), *options]) == 0
+    assert main(["train", "ppo-shield", "--start-from", str(first), "--out", str(second), *options]) == 0
     failures = [name for score in json.loads(capsys.readouterr().out)["scores"] for name in score["outcomes"]]
     assert not {"COLLISION", "OUT_OF_BOUNDS", "ROUGH_TRANSITION"} & set(failures)
 
@@ -58,7 +58,7 @@ def test_train_off_policy(tmp_path, capsys, algorithm):
 
 
 def test_bad_options(tmp_path, capsys):
-    assert main(["train", "ppo_shielded"]) == 2
+    assert main(["train", "ppo-shield"]) == 2
     assert "--start-from" in capsys.readouterr().err
     assert main(["train", "--resume", str(tmp_path)]) == 2
     assert "no training run" in capsys.readouterr().err

@@ -29,25 +29,25 @@ def small_recipes(tmp_path, monkeypatch):
     folder = tmp_path / "recipes"
     folder.mkdir()
     (folder / "ppo.yml").write_text(yaml.safe_dump(SMALL))
-    (folder / "ppo_shielded.yml").write_text(yaml.safe_dump({**SMALL, "shield": True}))
+    (folder / "ppo-shield.yml").write_text(yaml.safe_dump({**SMALL, "shield": True}))
     monkeypatch.setattr(recipes, "FOLDER", folder)
 
 
 @pytest.mark.usefixtures("small_recipes")
 def test_runs_are_trained_once_and_evaluated_as_they_are_meant_to_fly(tmp_path):
     runs = tmp_path / "runs"
-    measured = measure(Arguments(recipes=("ppo_shielded", "ppo"), seeds=(3,), runs=runs, episodes=6))
-    assert sorted(path.name for path in runs.iterdir()) == ["ppo-3", "ppo_shielded-3"]
-    config = yaml.safe_load((runs / "ppo_shielded-3" / "config.yaml").read_text())
+    measured = measure(Arguments(recipes=("ppo-shield", "ppo"), seeds=(3,), runs=runs, episodes=6))
+    assert sorted(path.name for path in runs.iterdir()) == ["ppo-3", "ppo-shield-3"]
+    config = yaml.safe_load((runs / "ppo-shield-3" / "config.yaml").read_text())
     assert config["run"]["start_from"] == str(runs / "ppo-3")
     shielded, alone = measured["runs"]
     assert [(c["worlds"], c["mission"]) for c in alone["flights"]] == [("20 spheres", m) for m in MISSIONS]
     assert [c["worlds"] for c in shielded["flights"]] == ["20 spheres"] * 3 + ["40 larger spheres"] * 3
-    agent = f"{runs / 'ppo_shielded-3' / 'agent'}+shield"
+    agent = f"{runs / 'ppo-shield-3' / 'agent'}+shield"
     _, dense = evaluate_held_out(agent, worlds=6, options=DENSE.options)
     assert [c["outcomes"] for c in shielded["flights"][3:]] == [score["outcomes"] for score in dense]
     written = {path: path.stat().st_mtime_ns for path in runs.rglob("*") if path.is_file()}
-    assert trained("ppo_shielded", 3, runs) == runs / "ppo_shielded-3"
+    assert trained("ppo-shield", 3, runs) == runs / "ppo-shield-3"
     assert written == {path: path.stat().st_mtime_ns for path in runs.rglob("*") if path.is_file()}
 
 

@@ -1,14 +1,26 @@
 """The command itself: which subcommands there are, what its help costs, and that compiling is told."""
 
 import json
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
+import gymnasium
 import pytest
 
+import hydrone_gym
+from agents import load_agent
 from hydrone_gym.cli import main
+from hydrone_gym.cli.missions import MissionOptions
+from hydrone_gym.evaluation.policies import find_policy
+from hydrone_gym.evaluation.suites import load_suite
+from planners import Shield
 
-NAMES = ("demonstrate", "evaluate", "failures", "fly", "replay", "train")
+ROOT = Path(__file__).resolve().parents[2]
+
+NAMES = ("demonstrate", "evaluate", "failures", "fly", "list", "replay", "train")
 
 
 @pytest.fixture
@@ -39,7 +51,8 @@ def test_help_lists_every_command_in_a_line(capsys, yachting):
     for name in NAMES:
         assert f"\n  {name} " in shown
     assert "  sail          Put to sea.\n" in shown
-    assert "cannot be loaded: ModuleNotFoundError: No module named 'no_such_module'" in shown
+    assert "cannot be loaded: ModuleNotFoundError: No module named 'no_such_module'" in " ".join(shown.split())
+    assert max(map(len, shown.splitlines())) <= 80
 
 
 def test_a_command_of_another_package(capsys, yachting):
@@ -53,14 +66,92 @@ def test_a_command_of_another_package(capsys, yachting):
     )
 
 
+@pytest.fixture
+def narrow(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+@pytest.mark.usefixtures("narrow")
 @pytest.mark.parametrize("name", NAMES)
 def test_every_command_has_help_and_json(name, capsys):
     with pytest.raises(SystemExit) as stop:
         main([name, "--help"])
     assert stop.value.code == 0
     shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= 80
     assert f"usage: hydrone {name}" in shown
     assert "--json" in shown
+
+
+def test_list_names_what_commands_take(capsys):
+    assert main(["list", "--json"]) == 0
+    names = json.loads(capsys.readouterr().out)
+    assert list(names) == ["policies", "suites", "agents", "missions"]
+    assert main(["list"]) == 0
+    columns = capsys.readouterr().out
+    assert max(map(len, columns.splitlines())) <= 80
+    words = columns.split()
+    assert all(name in words for kind, each in names.items() for name in (kind, *each))
+    for policy in names["policies"]:
+        find_policy(policy)
+    for suite in names["suites"]:
+        load_suite(suite, 1)
+    for agent in names["agents"]:
+        load_agent(agent)
+        assert agent in names["policies"]
+    for mission in names["missions"]:
+        assert MissionOptions(mission=mission, policy="straight-line", obstacles=0).prepare()[0].name == mission
+
+
+def test_tables_name_what_commands_take():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    tables = re.findall(r"^\| policy \|.*\n\|[-|: ]+\n((?:\|.*\n)+)", readme, re.MULTILINE)
+    assert tables
+    for row in "".join(tables).splitlines():
+        find_policy(row.split("|")[1].strip(" `"))
+
+
+@pytest.mark.parametrize("mission", ["random", "air-to-water", "HydroneGym/AirToWater-v0"])
+def test_a_mission_has_a_name_and_the_id_of_its_environment(mission):
+    (prepared,) = MissionOptions(mission=mission, policy="straight-line", obstacles=0).prepare()
+    assert prepared.name == ("random" if mission == "random" else "air-to-water")
+
+
+@pytest.mark.parametrize("options", [[], ["--shield"]])
+def test_an_agent_of_a_name_flies_the_same_wherever_it_is_named(options, tmp_path, monkeypatch):
+    """`ppo-shield` is behind the shield, once, as `hydrone evaluate` flies it."""
+    flown = []
+    report = "agents.failures.report.write_failure_report"
+    monkeypatch.setattr(report, lambda agent, *_, **__: flown.append(agent) or ([], {}))
+    assert main(["failures", "--agent", "ppo-shield", "--out", str(tmp_path), *options]) == 0
+    env = gymnasium.make("HydroneGym/Mission-v0")
+    shield = find_policy(flown[0]).make(env, 0)
+    assert isinstance(shield, Shield)
+    assert shield.policy.file.name == "ppo-shield"
+
+
+def test_version_and_module(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"hydrone {hydrone_gym.__version__}\n"
+    shown = subprocess.run([sys.executable, "-m", "hydrone_gym", "--version"], capture_output=True, text=True)
+    assert shown.stdout == f"hydrone {hydrone_gym.__version__}\n"
+
+
+def test_a_command_spelt_wrong_is_guessed(capsys):
+    with pytest.raises(SystemExit):
+        main(["fyl"])
+    assert "no command 'fyl' (did you mean 'fly'?): known are" in capsys.readouterr().err
+
+
+def test_an_install_that_is_named_exists():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    folders = [ROOT / name for name in ("hydrone_gym", "planners", "agents", "docs", "examples")]
+    files = [ROOT / "README.md", *(file for folder in folders for file in folder.rglob("*.*"))]
+    text = "".join(file.read_text(encoding="utf-8") for file in files if file.suffix in (".py", ".md", ".html"))
+    named = re.findall(r'pip install (?:-e )?"(?:hydrone-gym|\.)\[([\w,-]+)\]"|EXTRA: ClassVar = "([\w,]+)"', text)
+    named = {extra for names in named for extra in "".join(names).split(",")}
+    assert {"agents", "demonstrations", "replay", "render", "tensorboard"} <= named <= set(extras)
+    assert all(extras[name] for name in ("dask", "ray"))  # told by the name of the backend
 
 
 def test_help_needs_neither_torch_nor_kernels():

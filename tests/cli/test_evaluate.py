@@ -165,7 +165,7 @@ def test_a_stopped_evaluation_goes_on_to_the_same_rows(how, tmp_path, uninterrup
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--policies", "clrt"], "no policy 'clrt': known are clrrt, clrrt-published"),
+        (["--policies", "clrt"], "no policy 'clrt' (did you mean 'clrrt'?): known are clrrt, clrrt-published"),
         (["--policies", "gone.py:Mine"], "there is no file"),
         (["--suites", "paper-21"], "no suite 'paper-21': frozen are dense-40-v1"),
         (["--baseline", "ppo"], "--baseline must be one of straight-line, straight-line-shield, got 'ppo'"),

@@ -9,7 +9,7 @@ from hydrone_gym import cli
 from hydrone_gym.evaluation.records import read_records
 from tests.rendering.replay_pages import read_page
 
-FLIGHT = ["--experiment", "1", "--seed", "4"]
+FLIGHT = ["--mission", "air-to-water", "--seed", "4"]
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +42,8 @@ def test_json_names_page_outcome_and_trees(flown, tmp_path, capsys):
     assert cli.main(["replay", str(flown / "flight.json"), "--json", "--out", str(tmp_path / "new")]) == 0
     (shown,) = json.loads(capsys.readouterr().out)["replays"]
     (record,) = json.loads((flown / "flight.json").read_text())["flights"]
-    assert (shown["name"], shown["outcome"], shown["time"]) == ("experiment-1", "GOAL", record["time"])
-    assert shown["title"] == "Experiment 1, clrrt, seed 4"
+    assert (shown["name"], shown["outcome"], shown["time"]) == ("air-to-water", "GOAL", record["time"])
+    assert shown["title"] == "Air to water, clrrt, seed 4"
     assert shown["page"] == str(tmp_path / "new" / "replay.html")
     assert shown["trees"] == len(record["references"])
 
@@ -65,11 +65,11 @@ def test_several_flights_have_several_pages_and_one_can_be_chosen(tmp_path, caps
     assert cli.main(["fly", *empty, "--no-figures", "--out", "."]) == 0
     capsys.readouterr()
     assert cli.main(["replay", *empty]) == 0
-    pages = ["replay-experiment-1.html", "replay-experiment-2.html"]
+    pages = ["replay-air-to-water.html", "replay-water-to-air.html"]
     assert capsys.readouterr().out.split() == pages
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    assert cli.main(["replay", "flight.json", "--flight", "experiment-2", "--out", "two.html", "--open"]) == 0
+    assert cli.main(["replay", "flight.json", "--flight", "water-to-air", "--out", "two.html", "--open"]) == 0
     assert opened == [(tmp_path / "two.html").as_uri()]
     assert read_page(tmp_path / "two.html")[1] == read_page(tmp_path / pages[1])[1]
 
@@ -95,9 +95,9 @@ def test_a_row_of_an_evaluation_is_flown_again(evaluated, tmp_path, capsys):
         (["--seed", "-1"], "--seed must not be negative, got -1"),
         (["--world", "3"], "--world cannot be used with a fresh flight"),
         (["nowhere.json"], "nowhere.json"),
-        (["FLIGHT", "--experiment", "1"], "--experiment cannot be used with a saved flight"),
+        (["FLIGHT", "--mission", "air-to-water"], "--mission cannot be used with a saved flight"),
         (["FLIGHT", "--world", "1", "--policy", "mppi"], "--policy, --world cannot be used with a saved flight"),
-        (["FLIGHT", "--flight", "b"], "--flight must be one of experiment-1, got 'b'"),
+        (["FLIGHT", "--flight", "b"], "--flight must be one of air-to-water, got 'b'"),
         (["FOREIGN"], 'must be a file "hydrone_gym flights" of version 1'),
         (["RUN", "--seed", "4"], "--seed cannot be used with an evaluation"),
         (["RUN"], "--mission must be one of"),

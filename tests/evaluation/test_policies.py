@@ -69,7 +69,7 @@ def test_every_registered_name_makes_its_policy_for_the_environment(env):
     assert find_policy("clrrt").make(env, 7).seed == 7
     assert find_policy("clrrt").make(env, 7).simulation.vehicle == env.unwrapped.vehicle
     shielded = find_policy("ppo-shield").make(env, 0)
-    assert shielded.policy.file.name == "ppo_shielded"
+    assert shielded.policy.file.name == "ppo-shield"
     assert shielded.simulation.vehicle == env.unwrapped.vehicle
     assert type(find_policy("straight-line-shield").make(env, 0).policy) is StraightLine
 
@@ -148,7 +148,7 @@ def test_a_name_registered_by_another_package(tmp_path, env, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("clrt", "no policy 'clrt': known are clrrt, clrrt-published"),
+        ("clrt", "no policy 'clrt' (did you mean 'clrrt'?): known are clrrt, clrrt-published"),
         ("my_policies", "no policy 'my_policies'"),
         ("my_policies:", "no policy 'my_policies:'"),
         (":Still", "no policy ':Still'"),
