@@ -1,7 +1,6 @@
 """The subcommands of `hydrone` about agents; importing this needs none of what they need."""
 
 import json
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
@@ -14,7 +13,6 @@ from hydrone_gym.evaluation.suites import MISSIONS
 if TYPE_CHECKING:
     from agents.training import Flown
 
-INTERRUPTED = 130  # what shells give for Ctrl-C
 _Mission = Literal["random", "air-to-water", "water-to-air"]
 _IDS = dict(zip(get_args(_Mission), MISSIONS, strict=True))
 _Vehicle = Literal["paper", "physical"]
@@ -56,8 +54,7 @@ class Train:
         except KeyboardInterrupt:
             kept = sorted(path.name for path in folder.glob("checkpoints/step_*"))
             on = f"hydrone train --resume {folder} goes on after {kept[-1]}" if kept else "nothing is kept"
-            print(f"hydrone: interrupted; {on.replace('step_', 'step ')}", file=sys.stderr)
-            return INTERRUPTED
+            raise KeyboardInterrupt(on.replace("step_", "step ")) from None
         if self.json:
             print(json.dumps({"folder": str(folder), "scores": scores}))
             return 0

@@ -31,8 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; `arguments` default to those of the process."""
     try:
         return _main(sys.argv[1:] if arguments is None else list(arguments))
-    except KeyboardInterrupt:
-        print("hydrone: interrupted; the same command begins again", file=sys.stderr)
+    except KeyboardInterrupt as stopped:  # which says what to do now, where a command knows
+        print(f"hydrone: interrupted; {str(stopped) or 'the same command begins again'}", file=sys.stderr)
         return 130  # what shells give for Ctrl-C
 
 

@@ -1,18 +1,23 @@
 """The subcommand `hydrone evaluate`: policies on the same worlds, rows, statistics and tables."""
 
+import contextlib
 import json
+import os
 import sys
-import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from gymnasium.error import DependencyNotInstalled
 
+from hydrone_gym._folder_lock import held
 from hydrone_gym.cli import refused
+from hydrone_gym.evaluation.backends import check_jobs
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
+from hydrone_gym.evaluation.provenance import machine
 from hydrone_gym.evaluation.run import carry_out
 from hydrone_gym.evaluation.run_folder import LATEX, ROWS, SUMMARY, TABLES, RunFolder, write_results
 from hydrone_gym.evaluation.shown import Writer
@@ -20,14 +25,14 @@ from hydrone_gym.evaluation.tables import print_tables
 from hydrone_gym.rendering.files import Width, inches
 from hydrone_gym.rendering.replay import load_viser, write_replay
 
-INTERRUPTED = 130  # what shells give for Ctrl-C
+LOCAL = ("loky", "threading")  # backends whose workers share this machine
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate:
     """Fly policies through the same worlds and say how they compare.
 
-    The same command again goes on where an evaluation was stopped.
+    The same command again goes on where an evaluation was stopped; one that asks for more flies only that.
     """
 
     suites: tuple[str, ...] = ("paper-20",)
@@ -53,6 +58,14 @@ class Evaluate:
 
     def run(self) -> int:
         """Fly, report and return the exit code."""
+        try:
+            return self._run()
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("finished flights are kept, the same command goes on") from None
+
+    def _run(self) -> int:
+        """Check the input, hold the folder and fly."""
+        check_jobs(self.jobs)
         if self.report is None and (self.width is not None or self.no_title):
             raise ValueError("--width and --no-title are about the figures of a --report")
         inches(self.width)
@@ -61,23 +74,35 @@ class Evaluate:
         if self.baseline is not None and self.baseline not in labels:
             raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")
         out = Path("evaluations") / "+".join(suite.name for suite in plan.suites) if self.out is None else self.out
-        folder = RunFolder(out, plan.arguments(), overwrite=self.overwrite)
-        if self.report is not None:
-            self.report.mkdir(parents=True, exist_ok=True)
-        try:
-            return self._fly(plan, folder)
-        except OSError as error:  # a full disk, after the input was found good
-            return refused(error, 1)
-        except KeyboardInterrupt:
-            print("hydrone: interrupted; finished flights are kept, the same command goes on", file=sys.stderr)
-            return INTERRUPTED
+        with held(out):
+            folder = RunFolder(out, plan, overwrite=self.overwrite)
+            if self.report is not None:
+                self.report.mkdir(parents=True, exist_ok=True)
+            for note in self._notes(plan, folder):
+                print(f"hydrone: {note}", file=sys.stderr)
+            try:
+                return self._fly(plan, folder)
+            except OSError as error:  # a full disk, after the input was found good
+                return refused(error, 1)
+
+    def _notes(self, plan: Plan, folder: RunFolder) -> Iterator[str]:
+        """Yield what may surprise, a line each."""
+        for suite in plan.suites:
+            if self.worlds > (most := max(len(mission.scenarios) for mission in suite.missions)):
+                yield f"suite {suite.name} has {most} worlds a mission, all are flown: --worlds is {self.worlds}"
+        cores = machine()["cores"]
+        if self.backend in LOCAL and self.jobs is not None and self.jobs > cores:
+            yield f"--jobs {self.jobs} is more than the {cores} cores here: flights wait for each other"
+        if folder.records:
+            yield f"{len(folder.records)} of {len(plan.keys())} flights are taken from {folder.rows}"
+        if folder.changed:
+            yield f"flown anew, since the code is not what it was: {', '.join(folder.changed)}"
 
     def _fly(self, plan: Plan, folder: RunFolder) -> int:
         """Carry the plan out, write and show what came of it, and return the exit code."""
-        began = time.perf_counter()
-        records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
-        seconds = time.perf_counter() - began
-        document, overview = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=seconds)
+        with _stdout_to_stderr():
+            records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
+        document, overview = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=folder.seconds)
         paths = [folder.folder / name for name in (ROWS, SUMMARY, TABLES, LATEX)]
         if self.report is not None:
             writer = None if self.no_replays else _replay_writer()
@@ -91,6 +116,20 @@ class Evaluate:
             print("\nEach mission, crossings, energy, clearance and differences: in tables.md")
             print(*paths, sep="\n")
         return 0
+
+
+@contextlib.contextmanager
+def _stdout_to_stderr() -> Iterator[None]:
+    """What policies print, also in worker processes, must not get into the results."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def _replay_writer() -> Writer | None:

@@ -2,6 +2,7 @@
 
 from hydrone_gym.evaluation.flight import Ending, Flight, Trace, fly, fly_worlds
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Policy, known_policies
+from hydrone_gym.evaluation.provenance import made_with
 from hydrone_gym.evaluation.records import Record, read_records
 from hydrone_gym.evaluation.run import EvaluationStopped, evaluate, evaluate_held_out
 from hydrone_gym.evaluation.statistics import percentiles, wilson_interval
@@ -26,6 +27,7 @@ __all__ = [
     "frozen_suites",
     "known_policies",
     "load_suite",
+    "made_with",
     "percentiles",
     "read_records",
     "save_suite",

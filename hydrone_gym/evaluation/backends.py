@@ -17,7 +17,7 @@ _IDLE = 20  # s after which a worker without work ends: also one whose parent wa
 
 
 @contextlib.contextmanager
-def runner(backend: str | None, jobs: int | None) -> Iterator[Runner]:
+def runner(backend: str | None, jobs: int | None, most: int) -> Iterator[Runner]:
     """Yield what runs joblib's delayed calls and returns their results one by one, in order.
 
     Args:
@@ -27,13 +27,14 @@ def runner(backend: str | None, jobs: int | None) -> Iterator[Runner]:
             one. Ray joins RAY_ADDRESS or starts locally.
         jobs: how many at once; None for as many as there are cores, on a cluster those of the cluster, or what
             `parallel_config` has set where no backend is named.
+        most: how many calls there are; more jobs than that are not started.
 
     Raises ValueError for a backend that joblib does not know or that lacks its package, or jobs out of range.
     """
     import joblib
 
-    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= MOST_JOBS):
-        raise ValueError(f"jobs must be a whole number of at least 1, at most {MOST_JOBS}, got {jobs!r}")
+    check_jobs(jobs)
+    jobs = None if jobs is None else min(jobs, most)
     options: dict[str, Any] = {} if jobs is None else {"n_jobs": jobs}  # all others stay as the user set them
     if backend is not None:
         options = {"backend": backend, "n_jobs": jobs or -1}
@@ -56,6 +57,12 @@ def runner(backend: str | None, jobs: int | None) -> Iterator[Runner]:
             yield _in_portions
         else:
             yield parallel
+
+
+def check_jobs(jobs: int | None) -> None:
+    """Raise ValueError for a number of jobs out of range."""
+    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= MOST_JOBS):
+        raise ValueError(f"jobs must be a whole number of at least 1, at most {MOST_JOBS}, got {jobs!r}")
 
 
 def _in_portions(calls: Iterable[Any]) -> Generator[Any, None, None]:

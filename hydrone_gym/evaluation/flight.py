@@ -80,8 +80,9 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
     memory, start, done = None, np.array([True]), False
     while not done:
         began = time.perf_counter()
-        action, memory = policy.predict(observation, state=memory, episode_start=start, deterministic=True)
+        answer = policy.predict(observation, state=memory, episode_start=start, deterministic=True)
         decisions.append(1e3 * (time.perf_counter() - began))
+        action, memory = _checked(policy, answer, (4,))
         observation, reward, terminated, truncated, info = env.step(action)
         truth = world.truth
         states.append(truth["state"])
@@ -126,8 +127,9 @@ def fly_worlds(
         # rows fly on after their first episode; what they do then does not count, so the policy is spared it
         seen = {key: value[running] for key, value in observation.items()}
         actions, began = observation["reference"].astype(np.float32), time.perf_counter()
-        actions[running], memory = policy.predict(seen, state=memory, episode_start=starts, deterministic=True)
+        answer = policy.predict(seen, state=memory, episode_start=starts, deterministic=True)
         shares.append(1e3 * (time.perf_counter() - began) / len(running))
+        actions[running], memory = _checked(policy, answer, (len(running), 4))
         observation, rewards, _, _, info = env.step(actions)
         returns[running] += rewards[running]
         over = info["outcome"][running] != Outcome.RUNNING
@@ -144,6 +146,27 @@ def fly_worlds(
         on = np.flatnonzero(~over)
         running, memory, starts = running[on], _rows_of(memory, on), np.zeros(len(on), bool)
     return [endings[row] for row in range(env.num_envs)]
+
+
+def _checked(policy: Policy, answer: Any, shape: tuple[int, ...]) -> tuple[NDArray, Any]:
+    """Return action and memory as `predict` returned them; ValueError naming the policy, the rule and what came."""
+    must = f"policy {type(policy).__name__}: predict must return (action, state)"
+    if not isinstance(answer, tuple) or len(answer) != 2:
+        length = f" of length {len(answer)}" if isinstance(answer, tuple | list) else ""
+        raise ValueError(f"{must}, got {type(answer).__name__}{length}")
+    try:
+        action = np.asarray(answer[0])
+    except ValueError:  # rows of different lengths
+        action = np.asarray(None)
+    if action.dtype.kind not in "fiu":
+        got = f"{type(answer[0]).__name__} of dtype {action.dtype}"
+    elif action.shape != shape:
+        got = f"shape {action.shape}"
+    elif not np.isfinite(action).all():
+        got = str(action[~np.isfinite(action).all(axis=1)][0] if action.ndim == 2 else action)
+    else:
+        return action, answer[1]
+    raise ValueError(f"{must}, the action finite numbers (m, m, m, rad) of shape {shape}, got {got}")
 
 
 def _interventions(memory: Any, row: int = 0) -> int | None:

@@ -115,7 +115,7 @@ def _facts(stored: Stored) -> dict[str, str]:
         "Vehicle": f"{arguments['vehicle']} parameters",
         "Seed": str(arguments["seed"]),
         "Date": document["date"],
-        "Commit": document["commit"] or "none: an installed copy",
+        "Commit": document["commit"] or "unknown",
         "Machine": ", ".join(f"{value} cores" if key == "cores" else str(value) for key, value in machine.items()),
         "Versions": ", ".join(f"{name} {version}" for name, version in document["versions"].items()),
     }

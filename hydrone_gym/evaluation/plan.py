@@ -27,6 +27,8 @@ from hydrone_gym.world.scenario import Scenario
 WORLDS_A_JOB = 5  # enough that sending a job costs little, few enough that little is lost when one is cut short
 WORLDS_A_BATCH = 1000
 
+_FIXED = ("seed", "vehicle", "sources")  # arguments that every row depends on
+
 SuiteLike = str | Path | Suite
 PoliciesLike = str | Iterable[str] | Mapping[str, str | Factory]
 
@@ -102,15 +104,33 @@ class Plan:
         return [key for job in self.jobs() for key in job.keys]
 
     def arguments(self) -> dict[str, Any]:
-        """What the rows depend on, as plain data: an evaluation is resumed only where all of it is the same."""
+        """What the rows depend on, as plain data."""
         return {
             "suites": {suite.name: suite.fingerprint() for suite in self.suites},
             "worlds": {s.name: {m.name: len(m.scenarios) for m in s.missions} for s in self.suites},
             "policies": {policy.label: policy.origin for policy in self.policies},
+            "digests": {policy.label: policy.digest for policy in self.policies},
             "seed": self.seed,
             "vehicle": self.vehicle,
             "sources": sources(),
         }
+
+    def changes(self, before: Mapping[str, Any]) -> list[str]:
+        """Say why rows of an evaluation with other arguments are not rows of this one, nothing where they are.
+
+        What may differ is what more is flown, and the code of policies.
+        """
+        now = self.arguments()
+        told = [f"{name} was {before[name]}, is {now[name]}" for name in _FIXED if before[name] != now[name]]
+        suites = {suite.name: suite for suite in self.suites}
+        for name, fingerprint in before["suites"].items():
+            most = max(before["worlds"][name].values())
+            if name not in suites or suites[name].first(most).fingerprint() != fingerprint:
+                were, are = before["worlds"][name], now["worlds"].get(name, "none")
+                told.append(f"the worlds of {name} were {were}, are {are}{' others' * (were == are)}")
+        if gone := [label for label in before["policies"] if label not in now["policies"]]:
+            told.append(f"policies had {', '.join(gone)} too")
+        return told
 
     def check(self) -> None:
         """Reset every scenario and let every policy decide once, which also compiles or loads every kernel.
@@ -183,12 +203,12 @@ def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:
             return list(map(record_of, job.keys, endings)), None
         for key, scenario in zip(job.keys, scenarios, strict=True):
             records.append(record_of(key, fly(env, job.policy.make(env, job.seed), scenario=scenario)))
-    except Exception as error:  # whatever a user's policy may raise
+    except (Exception, SystemExit) as error:  # whatever a user's policy may raise
         return records, BrokenOff(job.keys[len(records)], told(error), traceback.format_exc())
     return records, None
 
 
-_warm: set[tuple[str, str]] = set()  # label and origin of the policies that have decided in this process
+_warm: set[tuple[str, str]] = set()  # label and digest of the policies that have decided in this process
 
 
 def _warm_up(job: Job, env: gym.Env) -> None:
@@ -196,12 +216,12 @@ def _warm_up(job: Job, env: gym.Env) -> None:
 
     What it raises then it will raise again in the flight.
     """
-    name = (job.policy.label, job.policy.origin)
+    name = (job.policy.label, job.policy.digest or job.policy.origin)
     if name in _warm:
         return
     _warm.add(name)
     observation, _ = env.reset(options={"scenario": job.worlds[0][1]})
-    with contextlib.suppress(Exception):
+    with contextlib.suppress(Exception, SystemExit):
         policy = job.policy.make(env, job.seed)
         action, _ = policy.predict(observation, state=None, episode_start=np.array([True]), deterministic=True)
         env.step(action)

@@ -26,6 +26,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym.evaluation.policy_code import digest_of, modules_of
+
 DEFAULT_POLICIES = (
     "straight-line",
     "straight-line-shield",
@@ -76,15 +78,19 @@ class PolicySource:
     search: str = ""  # folder that modules are imported from besides those installed; empty for none
     folder: str = ""  # of a trained agent, handed to the factory before the environment; empty for none
     wrapper: str = ""  # "module:attribute" of what is put around the policy; empty for nothing
+    digest: str = ""  # tells it from what it was before its code was edited; empty where nobody asks
 
     def make(self, env: Any, seed: int) -> Policy:
         """Return a new policy; ValueError naming it if its factory cannot be found, fails in any way or makes none."""
         try:
-            factory = load_factory(self.factory, self.search) if isinstance(self.factory, str) else self.factory
+            factory = self.factory
+            if isinstance(factory, str):
+                _check_unchanged(self)
+                factory = load_factory(factory, self.search, self.digest)
             arguments = (self.folder, env) if self.folder else (env,)
             policy = factory(*arguments, seed=seed) if _takes_seed(factory) else factory(*arguments)
             policy = load_factory(self.wrapper)(policy, env) if self.wrapper else policy
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise ValueError(f"policy {self.label!r} cannot be made: {told(error)}") from error
         if not callable(getattr(policy, "predict", None)):
             got = type(policy).__name__
@@ -107,6 +113,13 @@ class PolicySource:
         return cls(label=label, factory=factory, search=str(Path.cwd()), folder=folder, wrapper=wrapper)
 
 
+@cache
+def _check_unchanged(source: PolicySource) -> None:
+    """Raise ValueError if what this process is about to load is not what its evaluation began with."""
+    if source.digest and source.digest != digest_of(source.factory, source.search, source.folder, source.wrapper):
+        raise ValueError("its files have changed since the evaluation began")
+
+
 def known_policies() -> list[str]:
     """Return the names that installed packages have registered."""
     return sorted({entry.name for entry in entry_points(group=_NAMES)})
@@ -126,14 +139,27 @@ def find_policy(text: str) -> PolicySource:
 
     Raises ValueError saying why a policy cannot be found or loaded, FileNotFoundError for a file that does not exist.
     """
+    source = _digested(_find(text))
+    assert isinstance(source.factory, str)
+    load_factory(source.factory, source.search, source.digest)
+    return source
+
+
+def _digested(source: PolicySource) -> PolicySource:
+    """Note what a policy is made of now."""
+    return replace(source, digest=digest_of(source.factory, source.search, source.folder, source.wrapper))
+
+
+def _find(text: str) -> PolicySource:
+    """Find what a user means, without looking at it."""
     before, _, after = text.partition("=")
     label, given = (before, after) if after and _LABEL.fullmatch(before) else (text, text)
     inner, plus, name = given.rpartition("+")
     if plus and (wrappers := entry_points(group=_WRAPPERS, name=name)):
-        return replace(find_policy(inner), label=label, wrapper=_only(wrappers))
+        return replace(_find(inner), label=label, wrapper=_only(wrappers))
     if registered := entry_points(group=_NAMES, name=given):
         return PolicySource(label=label, factory=_only(registered))
-    if Path(given).is_dir():
+    if given and Path(given).is_dir():
         return PolicySource(label=label, factory=_reader(Path(given)), folder=str(Path(given).resolve()))
     place, colon, attribute = given.rpartition(":")
     if not colon or not place or not attribute:
@@ -144,7 +170,8 @@ def find_policy(text: str) -> PolicySource:
     factory, search = given, str(Path.cwd())
     if place.endswith(".py"):
         factory, search = f"{Path(place).resolve()}:{attribute}", ""
-    load_factory(factory, search)
+        if not Path(place).is_file():
+            raise FileNotFoundError(f"policy {given!r}: there is no file {place}")
     return PolicySource(label=label, factory=factory, search=search)
 
 
@@ -165,7 +192,11 @@ def find_policies(policies: str | Iterable[str] | Mapping[str, str | Factory]) -
 def _labelled(label: str, value: str | Factory) -> PolicySource:
     if not _LABEL.fullmatch(label):
         raise ValueError(f"a label must consist of letters, digits and . _ + -, got {label!r}")
-    return find_policy(f"{label}={value}") if isinstance(value, str) else PolicySource(label=label, factory=value)
+    return (
+        find_policy(f"{label}={value}")
+        if isinstance(value, str)
+        else _digested(PolicySource(label=label, factory=value))
+    )
 
 
 def _only(registered: Iterable[EntryPoint]) -> str:
@@ -186,22 +217,23 @@ def _reader(folder: Path) -> str:
 
 
 @cache
-def load_factory(path: str, search: str = "") -> Factory:
+def load_factory(path: str, search: str = "", digest: str = "") -> Factory:
     """Import what "module:attribute" or "file.py:attribute" names; ValueError says what is missing.
 
     A module of a user may fail in any way when it is imported; that way is named. What lies beside a file can be
-    imported from it.
+    imported from it. With another `digest` than the last, what was imported before is imported anew.
     """
     place, _, attribute = path.rpartition(":")
     file = Path(place) if place.endswith(".py") else None
-    if file and not file.is_file():
-        raise FileNotFoundError(f"policy {path!r}: there is no file {place}")
     search = str(file.parent) if file else search
     if search and search not in sys.path:
         sys.path.append(search)  # last: a file of the user's must not stand in for an installed module
+    if _imported.setdefault((path, search), digest) != digest:
+        _imported[path, search] = digest
+        _forget({name.partition(".")[0] for name in modules_of(path, search)})
     try:
         module = _module_of(file) if file else importlib.import_module(place)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"policy {path!r} cannot be imported: {type(error).__name__}: {error}") from error
     try:
         found: Any = operator.attrgetter(attribute)(module)
@@ -212,14 +244,23 @@ def load_factory(path: str, search: str = "") -> Factory:
     return found
 
 
+_imported: dict[tuple[str, str], str] = {}  # path and search of what this process has imported: its digest
+
+
+def _forget(tops: set[str]) -> None:
+    """Let modules of these packages be imported anew."""
+    importlib.invalidate_caches()
+    for name in [name for name in sys.modules if name.partition(".")[0] in tops]:
+        del sys.modules[name]
+
+
 def _module_of(file: Path) -> ModuleType:
-    """Run a file as a module."""
+    """Run a file as a module: as it is now, whatever was compiled of it within the same second."""
     name = f"policy_{file.stem}_{zlib.crc32(str(file).encode()):08x}"
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
-    assert spec.loader is not None
     module = sys.modules[name] = importlib.util.module_from_spec(spec)  # dataclasses and pickle look it up there
-    spec.loader.exec_module(module)
+    exec(compile(file.read_bytes(), file, "exec"), module.__dict__)
     return module
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,10 +9,11 @@ from typing import Any
 
 from tqdm import tqdm
 
+from hydrone_gym._folder_lock import held
 from hydrone_gym.evaluation.backends import runner
 from hydrone_gym.evaluation.plan import Plan, PoliciesLike, SuiteLike, fly_job, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory
-from hydrone_gym.evaluation.records import Record
+from hydrone_gym.evaluation.records import Key, Record
 from hydrone_gym.evaluation.run_folder import RunFolder, write_results
 from hydrone_gym.evaluation.suites import Suite
 from hydrone_gym.evaluation.summary import scores_of
@@ -53,20 +53,23 @@ def evaluate(
         jobs: flights at once.
         backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
             this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
-        out: folder for rows, written as they are finished, and results, ready for `page.write_report`; an evaluation
-            with the same arguments that was stopped there goes on where it was.
+        out: folder for rows, written as they are finished, and results, ready for `page.write_report`. Flights that
+            are there are not flown again, unless the code of their policy has changed: an evaluation that was stopped
+            goes on where it was, and one with more worlds or policies extends it.
 
     Raises:
         ValueError, TypeError, FileNotFoundError: an argument out of range, an unknown suite or policy, a folder with
             another evaluation, damaged rows.
+        BlockingIOError: another run is writing into `out`.
         EvaluationStopped: a policy raised in a flight, a worker died, or the disk is full. Finished rows are kept.
     """
     plan = make_plan(suites, policies, worlds=worlds, seed=seed, vehicle=vehicle)
-    folder = None if out is None else RunFolder(Path(out), plan.arguments())
-    began = time.perf_counter()
-    records = carry_out(plan, folder, jobs=jobs, backend=backend)
-    if folder is not None:
-        write_results(plan, records, folder.folder, seconds=time.perf_counter() - began)
+    if out is None:
+        return carry_out(plan, jobs=jobs, backend=backend)
+    with held(out):
+        folder = RunFolder(Path(out), plan)
+        records = carry_out(plan, folder, jobs=jobs, backend=backend)
+        write_results(plan, records, folder.folder, seconds=folder.seconds)
     return records
 
 
@@ -94,47 +97,56 @@ def carry_out(
 ) -> list[Record]:
     """Fly what of a plan is not finished yet in a folder, as `evaluate` does; `progress` shows a bar on stderr."""
     keys = plan.keys()
-    records = [] if folder is None else folder.finished(keys)
-    if len(records) == len(keys):
-        return records
+    records = [] if folder is None else list(folder.records)
+    calls = list(_calls(plan, {record.key for record in records}))
+    if calls:
+        with runner(backend, jobs, most=len(calls)) as run:
+            plan.check()
+            if folder is not None:
+                folder.begin()
+            bar = tqdm(total=len(keys), initial=len(records), unit="flight", disable=None if progress else True)
+            with bar, contextlib.closing(run(calls)) as results:
+                _gather(results, records, bar, folder)
+    rows = {record.key: record for record in records}
+    ordered = [rows[key] for key in keys]
+    if folder is not None:
+        folder.arrange(ordered)
+    return ordered
+
+
+def _gather(results: Iterator[Any], records: list[Record], bar: tqdm, folder: RunFolder | None) -> None:
+    """Append what workers return to the records and to the folder, until every flight is finished."""
 
     def stopped(reason: str) -> EvaluationStopped:
         place = "" if folder is None else f" and kept in {folder.rows}; the same evaluation goes on from there"
-        return EvaluationStopped(f"{reason}; {len(records)} of {len(keys)} flights are finished{place}", records)
+        return EvaluationStopped(f"{reason}; {len(records)} of {bar.total} flights are finished{place}", records)
 
-    plan.check()
-    with (
-        runner(backend, jobs) as run,
-        tqdm(total=len(keys), initial=len(records), unit="flight", disable=None if progress else True) as bar,
-        contextlib.closing(run(_calls(plan, len(records)))) as results,
-    ):
-        while len(records) < len(keys):
-            try:
-                finished, broken = next(results)
-            except Exception as error:  # a backend's own: a worker killed, a cluster lost, a policy that cannot be sent
-                raise stopped(f"workers failed: {type(error).__name__}: {error}") from error
-            try:
-                if folder is not None:
-                    folder.append(finished)
-            except OSError as error:
-                raise stopped(str(error)) from error
-            records += finished
-            bar.update(len(finished))
-            if broken is not None:
-                suite, mission, world, policy = broken.key
-                where = f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}"
-                failed = stopped(f"{where}: {broken.reason}")
-                failed.add_note(broken.details)
-                raise failed
-    return records
+    while len(records) < bar.total:
+        try:
+            finished, broken = next(results)
+        except Exception as error:  # a backend's own: a worker killed, a cluster lost, a policy that cannot be sent
+            raise stopped(f"workers failed: {type(error).__name__}: {error}") from error
+        try:
+            if folder is not None:
+                folder.append(finished)
+        except OSError as error:
+            raise stopped(str(error)) from error
+        records += finished
+        bar.update(len(finished))
+        if broken is not None:
+            suite, mission, world, policy = broken.key
+            failed = stopped(
+                f"policy {policy!r} failed in suite {suite}, mission {mission}, world {world}: {broken.reason}"
+            )
+            failed.add_note(broken.details)
+            raise failed
 
 
-def _calls(plan: Plan, done: int) -> Iterator[Any]:
-    """Yield what joblib is to call: the jobs of a plan without its first `done` flights."""
+def _calls(plan: Plan, done: set[Key]) -> Iterator[Any]:
+    """Yield what joblib is to call: the jobs of a plan without the flights that are done."""
     import joblib
 
     for job in plan.jobs():
-        skipped = min(done, len(job.worlds))
-        done -= skipped
-        if skipped < len(job.worlds):
-            yield joblib.delayed(fly_job)(replace(job, worlds=job.worlds[skipped:]))
+        worlds = tuple(world for world, key in zip(job.worlds, job.keys) if key not in done)
+        if worlds:
+            yield joblib.delayed(fly_job)(replace(job, worlds=worlds))

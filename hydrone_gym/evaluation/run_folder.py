@@ -2,13 +2,12 @@
 
 | file | content |
 |---|---|
-| `run.json` | the arguments |
+| `run.json` | the arguments, and the seconds so far |
 | `rows.csv` | a row a flight |
 | `summary.json`, `tables.md`, `tables.tex` | what came of it |
 """
 
 import dataclasses
-import itertools
 import json
 import os
 import time
@@ -18,7 +17,7 @@ from typing import Any, NamedTuple
 
 from hydrone_gym._whole_file import whole
 from hydrone_gym.evaluation.plan import Plan
-from hydrone_gym.evaluation.provenance import commit, machine, versions
+from hydrone_gym.evaluation.provenance import made_with
 from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, read_records, to_line
 from hydrone_gym.evaluation.statistics import Estimate
 from hydrone_gym.evaluation.summary import MissionSummary, summarise
@@ -33,43 +32,57 @@ _MAPPINGS = ("suites", "worlds", "policies", "versions", "machine")
 
 
 class RunFolder:
-    """Rows of an evaluation in a folder, which is made if missing.
+    """Rows of an evaluation in a folder, which is made if missing; whoever writes into it holds it with `held`.
 
-    `arguments` are what the rows depend on, as plain data; `overwrite` drops what another evaluation left there.
+    `overwrite` drops what another evaluation left there.
 
-    Raises ValueError for a folder with other arguments or damaged rows, OSError for what cannot be read or written.
+    Raises ValueError for a folder with flights that the plan does not ask for or that differ in more than the code of
+    policies, or with damaged rows, OSError for what cannot be read or written.
     """
 
-    def __init__(self, folder: Path, arguments: dict[str, Any], *, overwrite: bool = False) -> None:
-        """Compare arguments with those of the evaluation that is there, or begin a new one."""
+    def __init__(self, folder: Path, plan: Plan, *, overwrite: bool = False) -> None:
+        """Compare the plan with the evaluation that is there, and read its rows; nothing is written yet."""
         self.folder, self.rows = folder, folder / ROWS
+        self.changed: list[str] = []  #: policies whose code is not what it was, so that their rows do not count
+        self.records: list[Record] = []  #: the other rows, in the order of the file
+        self._arguments, self._before, self._began = plan.arguments(), 0.0, time.perf_counter()
         folder.mkdir(parents=True, exist_ok=True)
-        run = folder / RUN
         if overwrite:
             for name in (RUN, ROWS, SUMMARY, TABLES, LATEX):
                 (folder / name).unlink(missing_ok=True)
-        if run.exists():
-            _compare(run, json.loads(json.dumps(arguments)))
+        if (folder / RUN).exists():
+            self._compare(plan)
         elif self.rows.exists():
             raise ValueError(f"{folder}: holds {ROWS} without {RUN}: choose another folder, or overwrite it")
-        else:
-            _write_json(run, {"format": FORMAT, "version": VERSION, "arguments": arguments})
+        if self.rows.exists():
+            records = parse_records(self.rows.read_bytes(), os.fspath(self.rows))
+            _check_keys(records, set(plan.keys()), self.rows)
+            self.records = [record for record in records if record.policy not in self.changed]
+        self.seconds = self._before  #: wall-clock time of all runs until their last finished flights, s
 
-    def finished(self, keys: Sequence[Key]) -> list[Record]:
-        """Return the rows that are there, the first of those that `keys` name.
+    def _compare(self, plan: Plan) -> None:
+        """Find out what an evaluation in the folder has in common with a plan; ValueError if that is not enough."""
+        run = self.folder / RUN
+        try:
+            document = json.loads(run.read_text(encoding="utf-8"))
+            before, self._before = document["arguments"], float(document["seconds"])
+            differing = plan.changes(before)
+            digests = self._arguments["digests"]
+            self.changed = [label for label, old in before["digests"].items() if digests.get(label) != old]
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise ValueError(f"{run}: damaged: {type(error).__name__}: {error}") from None
+        if differing:
+            advice = "ask for all that it holds, or choose another folder, or overwrite it"
+            raise ValueError(
+                f"{self.folder}: holds an evaluation with other arguments ({'; '.join(differing)}): {advice}"
+            )
 
-        A last line that was cut off is removed from the file; a file with any other damage is left as it is.
-        """
-        if not self.rows.exists():
-            return []
-        content = self.rows.read_bytes()
-        records = parse_records(content, os.fspath(self.rows))
-        expected = itertools.chain(keys, itertools.repeat("the end of the file"))
-        for line, (record, key) in enumerate(zip(records, expected), start=2):
-            if record.key != key:
-                raise ValueError(f"{self.rows}, line {line}: expected the row of {key}, got {record.key}")
-        os.truncate(self.rows, content.rfind(b"\n") + 1)
-        return records
+    def begin(self) -> None:
+        """Make the folder ready for more rows: without those that do not count, a line cut off, and old results."""
+        for name in (SUMMARY, TABLES, LATEX):
+            (self.folder / name).unlink(missing_ok=True)
+        self.arrange(self.records)
+        self._write_run()
 
     def append(self, records: Sequence[Record]) -> None:
         """Write rows at the end, through to the operating system; OSError when it takes no more."""
@@ -78,19 +91,26 @@ class RunFolder:
             waiting = memoryview((b"" if stream.tell() else f"{HEADER}\n".encode()) + lines)
             while waiting:  # a disk that is nearly full takes a part
                 waiting = waiting[stream.write(waiting) :]
+        self._write_run()
+
+    def arrange(self, records: Sequence[Record]) -> None:
+        """See to it that the file holds these rows in this order and nothing else."""
+        text = "".join((f"{HEADER}\n", *map(to_line, records)))
+        if self.rows.exists() and self.rows.read_bytes() != text.encode():
+            write_whole(self.rows, text)
+
+    def _write_run(self) -> None:
+        self.seconds = self._before + time.perf_counter() - self._began
+        head = {"format": FORMAT, "version": VERSION}
+        _write_json(self.folder / RUN, {**head, "arguments": self._arguments, "seconds": self.seconds})
 
 
-def _compare(run: Path, arguments: dict[str, Any]) -> None:
-    """Raise ValueError unless the evaluation in a folder had these arguments, naming those that differ."""
-    try:
-        before = json.loads(run.read_text(encoding="utf-8"))["arguments"]
-        differing = sorted(key for key in before | arguments if before.get(key) != arguments.get(key))
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{run}: damaged: {type(error).__name__}: {error}") from None
-    if differing:
-        changes = "; ".join(f"{key} was {before.get(key)}, is {arguments.get(key)}" for key in differing)
-        advice = "choose another folder, or overwrite it"
-        raise ValueError(f"{run.parent}: holds an evaluation with other arguments ({changes}): {advice}")
+def _check_keys(records: Sequence[Record], asked: set[Key], rows: Path) -> None:
+    """Raise ValueError for a row that is not asked for, or that is there twice."""
+    for line, record in enumerate(records, start=2):
+        if record.key not in asked:
+            raise ValueError(f"{rows}, line {line}: there must be no row, or no second one, of {record.key}")
+        asked.remove(record.key)
 
 
 def write_results(
@@ -98,17 +118,14 @@ def write_results(
 ) -> tuple[dict[str, Any], list[Table]]:
     """Sum up the records of a plan, at least one, write summary and tables, and return the summary and its overview.
 
-    `seconds` is the wall-clock time that this run took, s.
+    `seconds` is the wall-clock time that all runs took, s.
     """
     summaries = summarise(records, baseline)
     document = {
         "format": f"{FORMAT} summary",
         "version": VERSION,
         "arguments": {**plan.arguments(), "baseline": summaries[0].baseline},
-        "versions": versions(),
-        "commit": commit(),
-        "machine": machine(),
-        "date": time.strftime("%Y-%m-%d"),
+        **made_with(),
         "seconds": seconds,
         "rows": len(records),
         "complete": len(records) == len(plan.keys()),

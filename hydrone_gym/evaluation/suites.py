@@ -133,7 +133,7 @@ def load_suite(name_or_path: str | os.PathLike[str], worlds: int | None = None) 
         options: dict[str, Any] = {} if count is None else {"num_obstacles": int(count)}
         options |= {} if low is None else {"obstacle_radius": (float(low), float(high))}
         return Suite.held_out(1000 if worlds is None else worlds, options, name=name)
-    if not path.exists():
+    if not name or not path.exists():
         frozen = ", ".join(frozen_suites())
         raise FileNotFoundError(f"no suite {name!r}: frozen are {frozen}; or give held-out, a file or a folder")
     return _from_folder(path) if path.is_dir() else _read(path)

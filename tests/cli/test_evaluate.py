@@ -8,9 +8,11 @@ import subprocess
 import sys
 import time
 
+import joblib
 import pytest
 
 from hydrone_gym import cli
+from hydrone_gym._folder_lock import held
 from hydrone_gym.evaluation import DEFAULT_POLICIES, evaluate, read_records
 from tests.evaluation.test_run import timeless
 
@@ -154,12 +156,65 @@ def test_a_stopped_evaluation_goes_on_to_the_same_rows(how, tmp_path, uninterrup
         assert told == "hydrone: interrupted; finished flights are kept, the same command goes on\n"
     kept = read_records(rows)
     assert 14 <= len(kept) < len(uninterrupted)
+    seconds = json.loads((tmp_path / "run.json").read_text())["seconds"]
     assert not (tmp_path / "summary.json").exists()
     done = run(*STOPPED, "--out", tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""  # nothing but results where the output is no terminal
+    took = f"hydrone: {len(kept)} of {len(uninterrupted)} flights are taken from {rows}\n"
+    assert done.stderr == took  # and nothing else where the output is no terminal
     assert read_records(rows)[: len(kept)] == kept
     assert timeless(read_records(rows)) == timeless(uninterrupted)
+    assert json.loads((tmp_path / "summary.json").read_text())["seconds"] > seconds > 0.0
+
+
+def test_a_folder_in_use_gives_2_at_once_and_a_killed_run_leaves_it_free(tmp_path, capsys):
+    command = ["evaluate", *STOPPED, "--worlds", "60", "--out", str(tmp_path)]
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *command], stderr=subprocess.DEVNULL, start_new_session=True
+    ) as process:
+        until = time.monotonic() + 120.0
+        while not (tmp_path / "rows.csv").exists() and time.monotonic() < until:
+            time.sleep(0.02)
+        assert cli.main(command) == 2
+        busy = f"hydrone: error: {tmp_path} is in use by another run (pid {process.pid})\n"
+        assert capsys.readouterr() == ("", busy)
+        process.kill()  # its workers find out later
+        process.wait()
+        with held(tmp_path):
+            pass
+        os.killpg(process.pid, signal.SIGKILL)
+    assert read_records(tmp_path / "rows.csv")
+
+
+def test_an_edited_policy_is_told_and_flown_anew(tmp_path, capsys):
+    file = tmp_path / "climber.py"
+    file.write_text(THIRD_PARTY)
+    command = ["evaluate", "--policies", "straight-line", f"climber={file}:OverTheTop", "--worlds", "2", "--jobs", "1"]
+    command += ["--out", str(tmp_path / "out"), "--json"]
+    assert cli.main(command) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    file.write_text(THIRD_PARTY.replace("9.0", "7.0"))
+    assert cli.main(command) == 0
+    again, err = capsys.readouterr()
+    assert err.splitlines() == [
+        f"hydrone: 4 of 8 flights are taken from {tmp_path / 'out' / 'rows.csv'}",
+        "hydrone: flown anew, since the code is not what it was: climber",
+    ]
+    first, second = ({e["policy"]: e for e in json.loads(text)["missions"][-1]["policies"]} for text in (out, again))
+    assert first["straight-line"] == second["straight-line"]
+    assert first["climber"]["energy"] != second["climber"]["energy"]
+
+
+def test_what_may_surprise_is_told(tmp_path, capsys):
+    cores = joblib.cpu_count()
+    command = ["evaluate", "--policies", "straight-line", "--out", str(tmp_path), "--json"]
+    options = ["--suites", "density", "--worlds", "51", "--jobs", str(cores + 1), "--backend", "threading"]
+    assert cli.main([*command, *options]) == 0
+    assert capsys.readouterr().err.splitlines() == [
+        "hydrone: suite density-v1 has 50 worlds a mission, all are flown: --worlds is 51",
+        f"hydrone: --jobs {cores + 1} is more than the {cores} cores here: flights wait for each other",
+    ]
 
 
 @pytest.mark.parametrize(

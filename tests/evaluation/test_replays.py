@@ -39,7 +39,7 @@ def flown(tmp_path_factory):
     """A real evaluation of two policies in four worlds."""
     folder = tmp_path_factory.mktemp("flown")
     plan = make_plan("paper-20", ["straight-line", "potential-field"], worlds=2)
-    records = carry_out(plan, RunFolder(folder, plan.arguments()))
+    records = carry_out(plan, RunFolder(folder, plan))
     write_results(plan, records, folder)
     return folder
 

@@ -25,6 +25,7 @@ from hydrone_gym.evaluation import (
     read_records,
     wilson_interval,
 )
+from hydrone_gym.evaluation.backends import runner
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import WORLDS_A_JOB, make_plan
 from hydrone_gym.evaluation.records import TIMING
@@ -234,3 +235,9 @@ def test_shipped_agents_fly_without_torch():
     """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)
     assert done.stdout.split() == ["4", "True"]
+
+
+@pytest.mark.parametrize(("jobs", "calls", "workers"), [(8, 2, 2), (2, 8, 2), (1, 1, 1)])
+def test_there_are_no_more_workers_than_calls(jobs, calls, workers):
+    with runner("threading", jobs, calls):
+        assert joblib.parallel.get_active_backend()[1] == workers

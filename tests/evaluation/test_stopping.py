@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -15,6 +16,8 @@ from hydrone_gym.evaluation.run import carry_out
 from hydrone_gym.evaluation.run_folder import ROWS, RUN, RunFolder
 from tests.evaluation.test_run import timeless
 
+PAPER = load_suite("paper-20")
+OTHERS = replace(PAPER, missions=tuple(replace(m, scenarios=m.scenarios[1:]) for m in PAPER.missions))
 LINES = {"policies": ["straight-line", "potential-field"], "worlds": WORLDS_A_JOB + 2}
 
 
@@ -50,28 +53,36 @@ def test_a_finished_evaluation_flies_nothing(finished, monkeypatch):
     [
         ({"seed": 1}, "seed was 0, is 1"),
         ({"vehicle": "physical"}, "vehicle was paper, is physical"),
-        ({"worlds": 3}, "worlds was {'paper-20-v1': {'air-to-water': 7"),
-        ({"policies": ["straight-line"]}, "policies was {'straight-line'"),
+        (
+            {"worlds": 3},
+            "the worlds of paper-20-v1 were {'air-to-water': 7, 'water-to-air': 7}, are {'air-to-water': 3",
+        ),
+        ({"policies": ["straight-line"]}, "policies had potential-field too"),
+        ({"suites": "dense-40"}, "the worlds of paper-20-v1 were {'air-to-water': 7, 'water-to-air': 7}, are none"),
+        ({"suites": OTHERS}, "are {'air-to-water': 7, 'water-to-air': 7} others"),
     ],
 )
 def test_another_evaluation_is_not_mixed_in(finished, changes, message):
     before = (finished / ROWS).read_bytes()
     with pytest.raises(ValueError, match="holds an evaluation with other arguments") as stop:
-        evaluate("paper-20", **{**LINES, **changes}, out=finished)
+        evaluate(**{"suites": "paper-20", **LINES, **changes}, out=finished)
     assert message in str(stop.value)
     assert (finished / ROWS).read_bytes() == before
 
 
-def test_policies_in_another_order_are_another_evaluation(finished):
-    with pytest.raises(ValueError, match="line 2: expected the row of"):
-        evaluate("paper-20", LINES["policies"][::-1], worlds=LINES["worlds"], out=finished)
+def test_policies_in_another_order_give_the_same_rows_in_that_order(finished, tmp_path):
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    turned = evaluate("paper-20", LINES["policies"][::-1], worlds=LINES["worlds"], out=tmp_path)
+    assert turned == read_records(tmp_path / ROWS)
+    assert turned != read_records(finished / ROWS)
+    assert {record.key: record for record in turned} == {r.key: r for r in read_records(finished / ROWS)}
 
 
 def test_overwriting_begins_anew(finished, tmp_path):
     for name in (RUN, ROWS):
         (tmp_path / name).write_bytes((finished / name).read_bytes())
     plan = make_plan("paper-20", "straight-line", worlds=2)
-    records = carry_out(plan, RunFolder(tmp_path, plan.arguments(), overwrite=True))
+    records = carry_out(plan, RunFolder(tmp_path, plan, overwrite=True))
     assert read_records(tmp_path / ROWS) == records
     assert len(records) == 4
     assert json.loads((tmp_path / RUN).read_text())["arguments"]["policies"].keys() == {"straight-line"}
@@ -82,7 +93,16 @@ def test_overwriting_begins_anew(finished, tmp_path):
     [
         (b",GOAL,1,", b",GOAL,2,", "column success: must be 0 or 1, got '2'"),
         (b",0,20,", b",0,,", "column obstacles: must be a whole number, got ''"),
-        (b"air-to-water", b"air-to-wine", "expected the row of"),
+        (
+            b"air-to-water",
+            b"air-to-wine",
+            "there must be no row, or no second one, of ('paper-20-v1', 'air-to-wine', 0, 'str",
+        ),
+        (
+            b"water-to-air,1,",
+            b"water-to-air,0,",
+            "there must be no row, or no second one, of ('paper-20-v1', 'water-to",
+        ),
         (b"\n", b"\n\n", "line 2: there must be 22 cells, got 0"),
     ],
 )
@@ -172,7 +192,7 @@ class Careless:
 
 def test_an_action_of_the_wrong_shape_is_the_policys_fault():
     with pytest.raises(
-        EvaluationStopped, match=r"policy 'careless' failed .* ValueError: action must have shape \(4,\)"
+        EvaluationStopped, match=r"policy 'careless' failed .* the action .* of shape \(4,\), got shape \(2,\)"
     ):
         evaluate("paper-20", {"careless": Careless}, worlds=1)
 
@@ -202,14 +222,16 @@ def test_a_disk_that_takes_no_more_keeps_whole_rows(tmp_path, worlds, limit, lea
 
 def test_a_block_that_is_written_in_part_is_written_to_its_end(tmp_path, monkeypatch):
     """A write may take less than it is given without an error."""
-    records = evaluate("paper-20", "straight-line", worlds=1)
-    folder = RunFolder(tmp_path, {})
+    plan = make_plan("paper-20", "straight-line", worlds=1)
+    records, folder = carry_out(plan), RunFolder(tmp_path, plan)
+    folder.begin()
 
     class Slow(io.FileIO):
         def write(self, content):
             return super().write(bytes(content[:7]))
 
     monkeypatch.setattr("builtins.open", lambda path, mode, buffering: Slow(path, "a"))
+    monkeypatch.setattr(folder, "_write_run", lambda: None)
     folder.append(records)
     monkeypatch.undo()
     assert read_records(tmp_path / ROWS) == records
