@@ -83,6 +83,7 @@ class EpisodeBatch:
         flown = self.outdoors.weathered, self.outdoors.extra
         if (self.simulations[0].weathered, self.simulations[0].extra) != flown:
             self.simulations = [simulation.flown_in(*flown) for simulation in self.simulations]
+            self.screen.go_out(*flown)
         now, lanes, threads, model = self.episodes, self.lanes, len(self.simulations), self.simulations[0]
         self._prepared = prepare(self.draws, model.world, model.vehicle.radius)
         self.perceived = perceive(now.rows, now.known, now.found)

@@ -202,7 +202,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             load_reference(action, core.low, core.high, references[0])
         else:
             references = core.references(np.asarray(action)[None])
-        screen.add(0, now.rows, references)
+        screen.add(0, now.rows, references, core.outdoors.conditions)
         core.advance(references)
         core.look(_ONLY)
         screen.update(now.rows, now.seen)

@@ -96,6 +96,13 @@ class Outdoors:
             self._weathers.append(weather)
         return self._weathers.index(weather)
 
+    def of_row(self, row: int) -> NDArray[np.float64]:
+        """Return a row's conditions as those of a single environment, (1, CONDITIONS); empty without weather."""
+        if not self.weathered:
+            return STILL
+        block = self.conditions[row // self._lanes].reshape(CONDITIONS, self._lanes)
+        return block[:, row % self._lanes].reshape(1, -1).copy()
+
     def weather(self) -> dict[str, NDArray[np.float64]]:
         """Return what moves around all rows as of the last tick, see `weather_at`; nothing without weather."""
         return weather_at(self.conditions, self._lanes, self._count) if self.weathered else {}

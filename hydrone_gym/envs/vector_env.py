@@ -131,7 +131,7 @@ class HydroneVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         references = core.references(actions)
         if self.render_mode is not None:
             for row in range(self.num_envs):
-                core.screen.add(row, core.episodes.rows, references)
+                core.screen.add(row, core.episodes.rows, references, core.outdoors.of_row(row))
         flown = core.fly(references, same_step=same_step)
         if self.render_mode is not None:
             core.show(core.starting.nonzero()[0])

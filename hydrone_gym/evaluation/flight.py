@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from hydrone_gym.envs.hydrone_env import HydroneEnv
 from hydrone_gym.evaluation.policies import Policy
+from hydrone_gym.simulation.conditions import weather_at
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
+from hydrone_gym.simulation.simulation import STILL, Simulation, row_at, trajectory
 from hydrone_gym.world.scenario import Scenario
 
 _TOLD = ("outcome", "time", "energy", "clearance", "transitions")  # by the last `info` of an episode
@@ -25,6 +26,12 @@ class Trace(NamedTuple):
     times: NDArray[np.float64]  # (N,) s
     states: NDArray[np.float64]  # (N, 12) the truth, laid out as in the observation
     references: NDArray[np.float64]  # (N, 4) the moving reference: m, m, m, rad
+    conditions: NDArray[np.float64]  # (N, CONDITIONS) the weather and the vehicle as they are; (N, 0) without weather
+
+    @property
+    def weather(self) -> dict[str, NDArray[np.float64]]:
+        """`wind` and `water` around the vehicle, (N, 3) in m/s, and `elevation` (N,) in m; nothing without weather."""
+        return weather_at(self.conditions, 1, len(self.times)) if self.conditions.size else {}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,6 +84,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         raise ValueError(f'fly needs an environment with interface="world", got {world.options.interface!r}')
     observation, info = env.reset(seed=seed, options=None if scenario is None else {"scenario": scenario})
     states, references, decisions, earned = [world.truth["state"]], [], [], 0.0
+    conditions = world.get_state().conditions
     memory, start, done = None, np.array([True]), False
     while not done:
         began = time.perf_counter()
@@ -89,7 +97,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         references.append(truth["reference"])
         earned += float(reward)  # one by one, as a batch does: sum() compensates since Python 3.12
         start, done = np.array([False]), terminated or truncated
-    trace = trace_of(world.simulation, world.scenario, states[0], np.array(references))
+    trace = trace_of(world.simulation, world.scenario, states[0], np.array(references), conditions)
     return Flight(
         obstacles=len(world.scenario.obstacles),
         scenario=world.scenario,
@@ -185,8 +193,13 @@ def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
 
 
 def trace_of(
-    simulation: Simulation, scenario: Scenario, start: NDArray[np.float64], references: NDArray[np.float64]
+    simulation: Simulation,
+    scenario: Scenario,
+    start: NDArray[np.float64],
+    references: NDArray[np.float64],
+    conditions: NDArray[np.float64] = STILL,
 ) -> Trace:
     """Play references again from a state, tick by tick: the same kernel, so the same flight bit for bit."""
     row = row_at(start, np.array(scenario.goal))
-    return Trace(*trajectory(simulation, row, references, scenario.obstacles)[:3])
+    flown = trajectory(simulation, row, references, scenario.obstacles, conditions)
+    return Trace(*flown[:3], flown[4])

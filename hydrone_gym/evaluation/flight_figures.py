@@ -70,7 +70,7 @@ def draw_flight(
     """
     from hydrone_gym.rendering.figures import WIDTH, plot_attitude, plot_path, plot_position
 
-    times, states, references = flight.trace
+    times, states, references = flight.trace[:3]
     world, position, wanted = simulation.world, states[:, :3], attitude_references(simulation, flight.trace)
     title, zone = title or name[:1].upper() + name[1:].replace("-", " "), world.zone
     ending = f"{title}: {flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"

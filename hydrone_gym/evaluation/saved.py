@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from hydrone_gym.evaluation.flight import Flight, trace_of
 from hydrone_gym.evaluation.statistics import percentiles
+from hydrone_gym.simulation.conditions import CONDITIONS
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.simulation import STILL, Simulation
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.scenario import Scenario
 
@@ -37,6 +38,7 @@ def flight_record(flight: Flight) -> dict[str, Any]:
             **{name: getattr(flight, name) for name in measured},
             "planning_ms": {"p50": p50, "p99": p99},
             **{name: getattr(flight, name) for name in ("references", "states", "detected")},
+            **({"conditions": flight.trace.conditions[0]} if flight.trace.conditions.size else {}),
         }
     )
 
@@ -66,6 +68,7 @@ class SavedFlight:
     references: NDArray[np.float64]  # (K, 4) a period: m, m, m, rad
     states: NDArray[np.float64]  # (K + 1, 12) at the start and after each period
     detected: NDArray[np.float64]  # (k, 4) spheres in order of detection, m
+    conditions: NDArray[np.float64]  # (1, CONDITIONS) at the start, empty without weather
     record: dict[str, Any]  # everything the file says of it, see `flight_record`
 
 
@@ -110,6 +113,7 @@ def _flight(record: dict[str, Any], document: dict[str, Any]) -> SavedFlight:
         references=references,
         states=states,
         detected=_rows("detected", record["detected"], 4),
+        conditions=_rows("conditions", [record["conditions"]], CONDITIONS) if "conditions" in record else STILL,
         record={**record, **{name: float(record[name]) for name in ("time", "energy", "length", "episode_return")}},
     )
 
@@ -130,7 +134,8 @@ def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
 
     Raises ValueError for references that lead elsewhere, as with another version of the model.
     """
-    trace = trace_of(simulation, saved.scenario, saved.states[0], saved.references)
+    flown = simulation.flown_in(saved.conditions.size > 0)
+    trace = trace_of(flown, saved.scenario, saved.states[0], saved.references, saved.conditions)
     last, ends = len(trace.times) - 1, simulation.ticks * np.arange(len(saved.states))
     apart = float(np.abs(trace.states[np.minimum(ends, last)] - saved.states).max())
     if not ends[-2] < last <= ends[-1] or apart > _SAME:

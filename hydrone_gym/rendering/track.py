@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import TICK, Simulation, trajectory
+from hydrone_gym.simulation.simulation import STILL, TICK, Simulation, trajectory
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import distances
 from hydrone_gym.world.scenario import Scenario
@@ -35,19 +35,19 @@ class Track:
         self.goal: NDArray[np.float64] = row["goal"][0].copy()
         self.obstacles = np.array(obstacles, dtype=np.float64)
         self._parts: list[Ticks] = [np.concatenate((row["state"][0], row["reference"][0]))[None]]
-        self._waiting: list[tuple[np.ndarray, NDArray[np.float64]]] = []
+        self._waiting: list[tuple[np.ndarray, NDArray[np.float64], NDArray[np.float64]]] = []
 
-    def add(self, row: np.ndarray, reference: NDArray[np.float64]) -> None:
-        """Note a period about to be flown: the row (1,) before it and the reference (4,) sent; both are copied."""
-        self._waiting.append((row.copy(), reference.copy()))
+    def add(self, row: np.ndarray, reference: NDArray[np.float64], conditions: NDArray[np.float64] = STILL) -> None:
+        """Note a period about to be flown: the row (1,) before it, the reference (4,) sent, conditions; all copied."""
+        self._waiting.append((row.copy(), reference.copy(), conditions.copy()))
 
     def ticks(self, simulation: Simulation) -> Ticks:
         """Return every tick so far, the start included; the same kernel gives the same numbers as the flight itself.
 
         `simulation` is of the flight's vehicle, world and period, with one lane.
         """
-        for row, reference in self._waiting:
-            _, states, references, _ = trajectory(simulation, row, reference[None], self.obstacles)
+        for row, reference, conditions in self._waiting:
+            _, states, references, *_ = trajectory(simulation, row, reference[None], self.obstacles, conditions)
             self._parts.append(np.hstack((states, references))[1:])
         self._waiting = []
         self._parts = [np.concatenate(self._parts)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hydrone_gym.rendering.camera import View
 from hydrone_gym.rendering.track import Moment, Track, moments
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import TICK, Simulation
+from hydrone_gym.simulation.simulation import STILL, TICK, Simulation
 
 MODES = ("rgb_array", "human")
 
@@ -53,10 +53,17 @@ class Screen:
         self._shown = 0
         self.update(rows, seen)
 
-    def add(self, n: int, rows: np.ndarray, references: NDArray[np.float64]) -> None:
-        """Row n is about to fly a period with its reference of (rows, 4), m and rad."""
+    def add(
+        self, n: int, rows: np.ndarray, references: NDArray[np.float64], conditions: NDArray[np.float64] = STILL
+    ) -> None:
+        """Row n is about to fly a period with its reference of (rows, 4), m and rad, in its conditions, if any."""
         if n in self._tracks:
-            self._tracks[n].add(rows[n : n + 1], references[n])
+            self._tracks[n].add(rows[n : n + 1], references[n], conditions)
+
+    def go_out(self, weathered: bool, extra: type | None) -> None:
+        """From now on fly in weather, with a disturbance of a class, or without."""
+        if self._painter is not None:
+            self._simulation = self._simulation.flown_in(weathered, extra)
 
     def update(self, rows: np.ndarray, seen: NDArray[np.uint8]) -> None:
         """Show the rest in the window, if any, in real time; a machine too slow skips pictures, never the last."""

@@ -93,7 +93,12 @@ class Simulation:
         last: int | None = None,
         weather: NDArray[np.float64] = STILL,
     ) -> None:
-        """Advance rows in place through ticks [first, last) of a period; see `advance_rows` for the layout."""
+        """Advance rows in place through ticks [first, last) of a period; see `advance_rows` for the layout.
+
+        Raises ValueError for a `weather` that the kernel does not read, or none where it reads one.
+        """
+        if self.weathered != (weather.size > 0):
+            raise ValueError(f"a simulation with weathered={self.weathered} got conditions of shape {weather.shape}")
         if references.dtype != np.float64 or not references.flags.c_contiguous:
             references = np.ascontiguousarray(references, np.float64)
         end = self.ticks if last is None else last
@@ -105,7 +110,8 @@ def trajectory(
     row: np.ndarray,
     references: ArrayLike,
     obstacles: ArrayLike | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], np.ndarray]:
+    conditions: NDArray[np.float64] = STILL,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], np.ndarray, NDArray[np.float64]]:
     """Play a sequence of references from a row and sample every tick, with the same numbers as whole periods give.
 
     Args:
@@ -113,29 +119,33 @@ def trajectory(
         row: (1,) dtype `ROW`; not changed.
         references: (K, 4) one reference a period (m, m, m, rad).
         obstacles: (M, 4) spheres x, y, z, r in m.
+        conditions: (1, CONDITIONS) of a simulation with weather; not changed.
 
     Returns:
-        Times (N,) in s, states (N, 12), the moving references (N, 4), and the final row. Ends early with the outcome.
+        Times (N,) in s, states (N, 12), the moving references (N, 4), the final row, and the conditions
+        (N, CONDITIONS), empty without weather. Ends early with the outcome.
     """
     # a copy, since a read-only array would compile another version of the kernel
     spheres = np.zeros((0, 4)) if obstacles is None else np.array(obstacles, dtype=np.float64)
     closest = np.full((1, len(spheres)), np.inf)
     flat = spheres.reshape(1, -1)
-    row = row.copy()
+    row, conditions = row.copy(), conditions.copy()
     start = row["ticks"][0]
     times, states, moving = [0.0], [row["state"][0].copy()], [row["reference"][0].copy()]
+    around = [conditions[0].copy()]
     for reference in np.asarray(references, dtype=np.float64, order="C"):
         old = row["reference"][0].copy()
         turn = (reference[3] - old[3] + np.pi) % (2.0 * np.pi) - np.pi
         move = np.append(reference[:3] - old[:3], turn)
         for tick in range(simulation.ticks):
-            simulation.advance(row, reference[None], flat, closest, len(spheres), tick, tick + 1)
+            simulation.advance(row, reference[None], flat, closest, len(spheres), tick, tick + 1, conditions)
+            around.append(conditions[0].copy())
             times.append((row["ticks"][0] - start) * TICK)
             states.append(row["state"][0].copy())
             moving.append(old + move * ((tick + 1) / simulation.ticks))
             if row["outcome"][0] != 0:
-                return np.array(times), np.array(states), np.array(moving), row
-    return np.array(times), np.array(states), np.array(moving), row
+                return np.array(times), np.array(states), np.array(moving), row, np.array(around)
+    return np.array(times), np.array(states), np.array(moving), row, np.array(around)
 
 
 def row_at(state: NDArray[np.float64], goal: NDArray[np.float64] | None = None) -> np.ndarray:
