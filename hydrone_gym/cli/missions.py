@@ -47,7 +47,8 @@ class MissionOptions:
     time_budget: float | None = None
     """Seconds a CL-RRT cycle may take, instead of a number of samples; not reproducible."""
     scenario: Path | None = None  # Fly this scenario file instead.
-    vehicle: Literal["paper", "physical"] = "paper"  # Parameter set of the vehicle.
+    vehicle: Literal["paper", "physical", "hydrone-2021"] = "paper"  # Parameter set of the vehicle.
+    weather: int = 0  # Level of wind, current, waves and of a vehicle that is not the nominal one, 0 to 5.
 
     def prepare(self) -> list[Prepared]:
         """Check the options and set up what they ask for; raises ValueError or OSError."""
@@ -63,7 +64,7 @@ class MissionOptions:
             count, flights = len(scenario.obstacles), {self.scenario.stem: MISSIONS["random"]}
         prepared = []
         for name, env_id in flights.items():
-            env = gym.make(env_id, num_obstacles=count, vehicle=self.vehicle)
+            env = gym.make(env_id, num_obstacles=count, vehicle=self.vehicle, weather=self.weather)
             observation, _ = env.reset(seed=self.seed, options=None if scenario is None else {"scenario": scenario})
             policy, drawn = source.make(env, self.seed), env.get_wrapper_attr("scenario")
             prepared.append(Prepared(name, title_of(name, self.policy, self.seed), env, policy, drawn, observation))

@@ -148,7 +148,9 @@ def _restored(saved: SavedFlight) -> Take:
 
     There are none where the policy is not a registered one or flies otherwise now.
     """
-    env = gym.make(MISSIONS["random"], num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle)
+    env = gym.make(
+        MISSIONS["random"], num_obstacles=len(saved.scenario.obstacles), vehicle=saved.vehicle, weather=saved.weather
+    )
     simulation = env.get_wrapper_attr("simulation")
     flight, trees = restore(saved, simulation), ()
     if saved.policy in known_policies():

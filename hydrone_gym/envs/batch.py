@@ -282,7 +282,8 @@ class EpisodeBatch:
     def show(self, rows: NDArray[np.int64]) -> None:
         """Begin anew on the screen, where rows begin an episode."""
         for row in rows.tolist():
-            self.screen.begin(row, self.episodes.rows, self.episodes.seen, self.spheres(row))
+            now, conditions = self.episodes, self.outdoors.of_row(row)
+            self.screen.begin(row, now.rows, now.seen, self.spheres(row), conditions)
 
     def render(self, row: int) -> NDArray[np.uint8] | None:
         """Return a new picture of a row (height, width, 3), or None if there is none or it is shown in a window."""

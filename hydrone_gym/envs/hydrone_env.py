@@ -181,7 +181,8 @@ class HydroneEnv(gym.Env[Any, Any]):
         core.outdoors.reseeded |= seed is not None
         core.begin(_ONLY, core.missions_of(_ONLY, [scenario]), [scenario])
         self._scenario, self._outcome = scenario, RUNNING
-        core.screen.begin(0, core.episodes.rows, core.episodes.seen, scenario.obstacles)
+        now, conditions = core.episodes, core.outdoors.conditions
+        core.screen.begin(0, now.rows, now.seen, scenario.obstacles, conditions)
         return core.observation_of(0), info_of(
             core.episodes.report[0].tolist(), core.transitions[0], core.outdoors.weather()
         )
@@ -259,7 +260,8 @@ class HydroneEnv(gym.Env[Any, Any]):
         core.transitions[0] = [dict(crossing) for crossing in snapshot.transitions]
         self.np_random.bit_generator.state = copy.deepcopy(snapshot.random_state)
         self._np_random_seed = snapshot.seed
-        core.screen.restore(0, core.episodes.rows, self.scenario.obstacles, snapshot.track)
+        conditions = core.outdoors.conditions
+        core.screen.restore(0, core.episodes.rows, self.scenario.obstacles, snapshot.track, conditions)
 
 
 HydroneEnv.__doc__ = with_options(HydroneEnv.__doc__, Options)

@@ -63,26 +63,33 @@ def draw_flight(
     width: float | None = None,
     titled: bool = True,
 ) -> list[Path]:
-    """Write path, position and attitude of a flight as PNG and PDF; return the paths.
+    """Write path, position, attitude and, if there is any, weather of a flight as PNG and PDF; return the paths.
 
     `simulation` is that of the environment it was flown in; `name` begins the name of every file in the existing
     `directory`, and `title` every title; unless given, that is the name. `width` (inches) is that of a paper's column.
     """
-    from hydrone_gym.rendering.figures import WIDTH, plot_attitude, plot_path, plot_position
+    from hydrone_gym.rendering.figures import WIDTH, plot_attitude, plot_path, plot_position, plot_weather
 
     times, states, references = flight.trace[:3]
     world, position, wanted = simulation.world, states[:, :3], attitude_references(simulation, flight.trace)
     title, zone = title or name[:1].upper() + name[1:].replace("-", " "), world.zone
     ending = f"{title}: {flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"
+    weather = flight.trace.weather
+    elevations = weather.get("elevation")
     spheres = (flight.detected, flight.undetected)
     look: dict[str, Any] = {"world": world, "width": drawn_width(width, WIDTH), "title": ending}
     figures = {
         "path": plot_path(position, flight.scenario.goal, *spheres, **look),
-        "position": plot_position(times, position, references[:, :3], zone=zone, title=f"{title}: position over time"),
+        "position": plot_position(
+            times, position, references[:, :3], zone=zone, title=f"{title}: position over time", elevations=elevations
+        ),
         "attitude": plot_attitude(
             times, states[:, 3:6], wanted, states[:, 2], zone=zone, title=f"{title}: attitude over time"
         ),
     }
+    if weather:
+        told = f"{title}: weather at the vehicle"
+        figures["weather"] = plot_weather(times, weather["wind"], weather["water"], weather["elevation"], title=told)
     files = []
     for kind, figure in figures.items():
         files += save_figure(figure, directory / f"{name}-{kind}", width=width, titled=titled)

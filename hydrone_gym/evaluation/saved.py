@@ -61,9 +61,10 @@ class SavedFlight:
     """A flight in a file of `hydrone fly`."""
 
     name: str  # what the file calls it
-    policy: str  # option it was flown with, as the next two
+    policy: str  # option it was flown with, as the next three
     seed: int
     vehicle: str
+    weather: int
     scenario: Scenario  # what was flown
     references: NDArray[np.float64]  # (K, 4) a period: m, m, m, rad
     states: NDArray[np.float64]  # (K + 1, 12) at the start and after each period
@@ -109,6 +110,7 @@ def _flight(record: dict[str, Any], document: dict[str, Any]) -> SavedFlight:
         policy=str(document["policy"]),
         seed=int(document["seed"]),
         vehicle=document["vehicle"],
+        weather=int(document.get("weather", 0)),
         scenario=Scenario(**record["scenario"]),
         references=references,
         states=states,

@@ -86,15 +86,50 @@ def plot_tree(tree: Tree, scenario: Scenario, world: World, *, title: str = "", 
     return _finished(scene, title, (start, goal, world.goal_radius), "start (root)", entries)
 
 
-def plot_position(times: Array, positions: Array, references: Array, *, zone: float = 0.8, title: str = "") -> Figure:
+def plot_position(
+    times: Array,
+    positions: Array,
+    references: Array,
+    *,
+    zone: float = 0.8,
+    title: str = "",
+    elevations: Array | None = None,
+) -> Figure:
     """Draw x, y, z (N, 3) over time (N,), executed and reference (paper, Figs. 7 and 10).
 
     `zone` (m) is half the height of the transition zone: a band in z, and the time spent inside it in every panel.
+    `elevations` (N,) are those of the surface at the vehicle, m; None for flat water.
     """
     labels = ("x (m)", "y (m)", "z (m)")
     figure = _histories(title, times, labels, positions, references, positions[:, 2], zone)
     figure.axes[2].axhspan(-zone, zone, alpha=0.22, **_ZONE)
-    figure.axes[2].axhline(0.0, color=style.BLUE, linewidth=1.0)
+    if elevations is None:
+        figure.axes[2].axhline(0.0, color=style.BLUE, linewidth=1.0)
+    else:
+        figure.axes[2].plot(times, elevations, color=style.BLUE, linewidth=1.0)
+    return figure
+
+
+def plot_weather(times: Array, winds: Array, waters: Array, elevations: Array, *, title: str = "") -> Figure:
+    """Draw wind and water velocities (N, 3) in m/s and the surface's elevation (N,) in m at the vehicle over time."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(style.FONTS):
+        figure = Figure(figsize=(WIDTH, 5.6), dpi=style.DOTS_PER_INCH, layout="constrained")
+        figure.suptitle(title)
+        panels = figure.subplots(3, 1, sharex=True)
+        axes = (("x", style.RED, "-"), ("y", style.BLUE, "--"), ("z", style.BLACK, ":"))
+        for panel, label, velocity in zip(panels, ("wind (m/s)", "water (m/s)"), (winds, waters), strict=False):
+            for (axis, colour, dashes), values in zip(axes, velocity.T, strict=True):
+                panel.plot(times, values, color=colour, linestyle=dashes, linewidth=1.6, label=axis)
+            panel.set_ylabel(label)
+        panels[2].plot(times, elevations, color=style.BLUE, linewidth=1.6)
+        panels[2].set(ylabel="surface (m)", xlabel="time (s)", xlim=(times[0], times[-1]))
+        for panel in panels:
+            panel.grid(color="#e6e6e6", linewidth=0.6)
+        figure.align_ylabels(panels)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 

@@ -38,7 +38,9 @@ class Painter:
         scale = 1.0 if self._following else max(_OVERVIEW_SCALE, widest)
         image = self._canvas.picture(self._shapes(moment, pose, unit, scale), pose, box)
         ground = {Outcome.RUNNING: _GROUND, Outcome.GOAL: _GOOD}.get(moment.outcome, _BAD)
-        _write(image, "   ".join(moment.words(self.world.zone)), ground)
+        outdoors = moment.outdoors(self.world)
+        words = moment.words(self.world.zone) + (() if outdoors is None else (outdoors.words,))
+        _write(image, "   ".join(words), ground)
         return image
 
     def pose(self, moment: Moment) -> Pose:
@@ -66,7 +68,8 @@ class Painter:
             shapes.goal(moment.goal, self.world.goal_radius, pose, max(0.35, 8.0 * end), 1.6 * end),
             shapes.reference(now[12:15], pose, max(0.15, 4.5 * sent), max(0.014, 1.1 * sent)),
         )
-        return np.vstack(parts)
+        outdoors = moment.outdoors(self.world)
+        return np.vstack(parts if outdoors is None else (*parts, shapes.weather(outdoors, max(0.03, 1.4 * unit))))
 
 
 @functools.lru_cache(_LABELS)

@@ -32,6 +32,11 @@ _FLIGHT = (
     ("ball", DETECTED, "obstacle detected"),
     ("band", style.WATER, "water; darker: transition zone"),
 )
+_WEATHER = (
+    ("line", style.BLACK, "wind at the vehicle, half a metre for 1 m/s"),
+    ("line", style.BLUE, "water at the vehicle, 4 m for 1 m/s"),
+    ("thin", style.BLUE, "the moving surface"),
+)
 _TREE = (
     ("thin", style.RED, "tree of the planner, in the air"),
     ("thin", style.PURPLE, "the same, under water"),
@@ -125,7 +130,7 @@ def _dressed(page: str, title: str, last: Moment, world: World, poses: list[_Fit
     time, end = last.words(world.zone)
     entries = "".join(
         f'<li><i class="{kind}" style="background:{colour}"></i>{text}</li>'
-        for kind, colour, text in (*_FLIGHT, *(_TREE if trees else ()))
+        for kind, colour, text in (*_FLIGHT, *(_WEATHER if last.outdoors(world) else ()), *(_TREE if trees else ()))
     )
     about = (
         f'<div id="title"><h1>{escape(title)}</h1><p>{end} after {time}</p></div>'

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import Pose
+from hydrone_gym.rendering.outdoors import Outdoors, barbed
 from hydrone_gym.rendering.paths import along
 from hydrone_gym.rendering.solids import CAPSULE, DISC, OPACITY, SHADOW, SHAPE_FIELDS, SPHERE
 from hydrone_gym.surface import in_air
@@ -21,6 +22,7 @@ _ARM = ("#10283a", "#4a6f8c")
 _REAR = ("#10283a", "#f4f7fa")
 _SHADE = ("#0a2238", "#0a2238")
 _HAIR = 0.005  # m: a shadow lies on its ground
+_WAVE, _CURRENT = ("#2a83b8", "#8fc9ec"), ("#003f66", style.BLUE)
 _PLUMB = ("#4f6475", "#6d8596")
 
 
@@ -89,6 +91,20 @@ def path(points: NDArray[np.float64], radius: float) -> Shapes:
     moved = (chosen[1:] != chosen[:-1]).any(axis=1)
     tube = _rows(CAPSULE, chosen[:-1][moved], chosen[1:][moved], radius, _ORANGE)
     return np.vstack((_rows(SPHERE, points[0], 0.0, 2.2 * radius, _BLACK), tube))
+
+
+def weather(seen: Outdoors, radius: float) -> Shapes:
+    """Lines on the moving surface, and arrows along wind (black) and current (blue), so thick (m)."""
+    lines = seen.waves.reshape(-1, *seen.waves.shape[-2:])
+    starts, ends = lines[:, :-1].reshape(-1, 3), lines[:, 1:].reshape(-1, 3)
+    wind, water = barbed(seen.wind), barbed(seen.current)
+    blown, flowing = (np.ptp(edges[0], axis=0).any() for edges in (wind, water))
+    parts = (
+        _rows(CAPSULE, starts, ends, 0.7 * radius, _WAVE) if len(starts) else np.empty((0, len(SHAPE_FIELDS))),
+        _rows(CAPSULE, wind[:, 0], wind[:, 1], radius, _BLACK)[: 3 * blown],
+        _rows(CAPSULE, water[:, 0], water[:, 1], radius, _CURRENT)[: 3 * flowing],
+    )
+    return np.vstack(parts)
 
 
 def plumb(point: NDArray[np.float64], radius: float) -> Shapes:

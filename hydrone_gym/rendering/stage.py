@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from hydrone_gym.rendering import shapes, style
+from hydrone_gym.rendering.outdoors import Outdoors, barbed
 from hydrone_gym.rendering.solids import CAPSULE
 from hydrone_gym.rendering.track import Moment, Tree
 from hydrone_gym.simulation.simulation import Simulation
@@ -66,6 +67,7 @@ class Stage:
         self._add_marks(moment, self._world)
         self._add_box(self._world)
         self._add_water(self._world)
+        self._weather: dict[str, Any] = {}
         dry = in_air(self._middles[:, 2])
         groups = (
             ("detected", dry | True, True, None),
@@ -85,11 +87,30 @@ class Stage:
         self._vehicle.position, self._vehicle.wxyz = state[:3], turn.as_quat(scalar_first=True)
         self._reference.position = reference
         self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
-        self._label.text = ", ".join(moment.words(self._world.zone))
+        outdoors = moment.outdoors(self._world)
+        self._label.text = ", ".join(moment.words(self._world.zone) + ((outdoors.words,) if outdoors else ()))
+        if outdoors is not None:
+            self._blow(outdoors)
         self._grow(moment.ticks[:, :3])
         for bodies, chosen, known in self._obstacles:
             scales = np.where(moment.detected == known, self._sizes, _GONE)
             bodies.batched_scales = scales[chosen].astype(np.float32)
+
+    def _blow(self, now: Outdoors) -> None:
+        """Show the weather of a moment."""
+        waves = np.stack((now.waves[:, :-1], now.waves[:, 1:]), axis=2).reshape(-1, 2, 3)
+        for name, edges, colour, width in (
+            ("/weather/waves", waves, style.BLUE, 1.0),
+            ("/weather/wind", barbed(now.wind), style.BLACK, 3.0),
+            ("/weather/current", barbed(now.current), style.BLUE, 3.0),
+        ):
+            if not len(edges):
+                continue
+            points = np.round(_FINE * edges) / _FINE
+            if name in self._weather:
+                self._weather[name].points = points.astype(np.float32)
+            else:
+                self._weather[name] = self._lines(name, points, colour, width)
 
     def plan(self, tree: Tree) -> None:
         """Show the tree of a period, and the path in it."""

@@ -10,13 +10,17 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym.rendering.outdoors import Outdoors, outdoors
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import STILL, TICK, Simulation, trajectory
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import distances
 from hydrone_gym.world.scenario import Scenario
+from hydrone_gym.world.world import World
 
-Ticks = NDArray[np.float64]  # (N, 16) a row a tick: state (12), and reference x, y, z in m and yaw in rad (4)
+# (N, 16) a row a tick: state (12), and reference x, y, z in m and yaw in rad (4); in weather its `Conditions` after
+Ticks = NDArray[np.float64]
+_CONDITIONS = 16  # where they begin
 _ENDS = {
     Outcome.GOAL: "goal reached",
     Outcome.COLLISION: "collision",
@@ -31,10 +35,12 @@ _SLACK = 1e-3  # m: ticks are samples, sensing is continuous
 class Track:
     """The flight of one vehicle from where it was first seen: a row (1,) of dtype `ROW`, and obstacles (M, BODY)."""
 
-    def __init__(self, row: np.ndarray, obstacles: NDArray[np.float64]) -> None:
+    def __init__(
+        self, row: np.ndarray, obstacles: NDArray[np.float64], conditions: NDArray[np.float64] = STILL
+    ) -> None:
         self.goal: NDArray[np.float64] = row["goal"][0].copy()
         self.obstacles = np.array(obstacles, dtype=np.float64)
-        self._parts: list[Ticks] = [np.concatenate((row["state"][0], row["reference"][0]))[None]]
+        self._parts: list[Ticks] = [np.concatenate((row["state"][0], row["reference"][0], conditions[0]))[None]]
         self._waiting: list[tuple[np.ndarray, NDArray[np.float64], NDArray[np.float64]]] = []
 
     def add(self, row: np.ndarray, reference: NDArray[np.float64], conditions: NDArray[np.float64] = STILL) -> None:
@@ -47,8 +53,8 @@ class Track:
         `simulation` is of the flight's vehicle, world and period, with one lane.
         """
         for row, reference, conditions in self._waiting:
-            _, states, references, *_ = trajectory(simulation, row, reference[None], self.obstacles, conditions)
-            self._parts.append(np.hstack((states, references))[1:])
+            flown = trajectory(simulation, row, reference[None], self.obstacles, conditions)
+            self._parts.append(np.hstack((flown[1], flown[2], flown[4]))[1:])
         self._waiting = []
         self._parts = [np.concatenate(self._parts)]
         return self._parts[0]
@@ -75,6 +81,11 @@ class Moment(NamedTuple):
         z = float(self.ticks[-1, 2])
         medium = "crossing" if abs(z) <= zone else "in the air" if in_air(z) else "under water"
         return f"{self.time:.1f} s", _ENDS.get(self.outcome, medium)
+
+    def outdoors(self, world: World) -> Outdoors | None:
+        """Return what there is to draw of the weather, None without any."""
+        now = self.ticks[-1]
+        return outdoors(now[_CONDITIONS:], now[:3], self.time, world) if len(now) > _CONDITIONS else None
 
 
 def moments(last: Moment, counts: Iterable[int], sensor_range: float) -> Iterator[Moment]:
@@ -111,12 +122,13 @@ class Flown(Protocol):
 
     @property
     def trace(self) -> Any:
-        """Every tick: `states` (N, 12) and `references` (N, 4)."""
+        """Every tick: `states` (N, 12), `references` (N, 4), `conditions` (N, CONDITIONS), (N, 0) without weather."""
 
 
 def moment_of(flight: Flown) -> Moment:
     """Return the end of a flight as a moment to be drawn."""
-    ticks, obstacles = np.hstack((flight.trace.states, flight.trace.references)), flight.scenario.obstacles
+    trace, obstacles = flight.trace, flight.scenario.obstacles
+    ticks = np.hstack((trace.states, trace.references, trace.conditions))
     detected = (obstacles[:, None] == flight.detected).all(axis=2).any(axis=1)
     return Moment(ticks, np.array(flight.scenario.goal), obstacles, detected, flight.time, flight.outcome)
 

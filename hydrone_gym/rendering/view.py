@@ -44,12 +44,19 @@ class Screen:
             self._painter = Painter(view, simulation.world, simulation.vehicle)
             self._window = Window(view.size) if mode == "human" else None
 
-    def begin(self, n: int, rows: np.ndarray, seen: NDArray[np.uint8], obstacles: NDArray[np.float64]) -> None:
-        """Row n of rows (N,) of dtype `ROW` begins a flight where it is, among obstacles (k, BODY).
+    def begin(
+        self,
+        n: int,
+        rows: np.ndarray,
+        seen: NDArray[np.uint8],
+        obstacles: NDArray[np.float64],
+        conditions: NDArray[np.float64] = STILL,
+    ) -> None:
+        """Row n of rows (N,) of dtype `ROW` begins a flight where it is, among obstacles (k, BODY), in its conditions.
 
         Of `seen` (N, M), M at least k, a detected obstacle has 1.
         """
-        self.restore(n, rows, obstacles, None)
+        self.restore(n, rows, obstacles, None, conditions)
         self._shown = 0
         self.update(rows, seen)
 
@@ -100,10 +107,18 @@ class Screen:
         """Return a copy of what row n has flown, if that is kept."""
         return self._tracks[n].copy() if n in self._tracks else None
 
-    def restore(self, n: int, rows: np.ndarray, obstacles: NDArray[np.float64], track: Track | None) -> None:
-        """Row n goes on from another state; without a track its path begins there."""
+    def restore(
+        self,
+        n: int,
+        rows: np.ndarray,
+        obstacles: NDArray[np.float64],
+        track: Track | None,
+        conditions: NDArray[np.float64] = STILL,
+    ) -> None:
+        """Row n goes on from another state, in conditions (1, CONDITIONS); without a track its path begins there."""
         if self._painter is not None:
-            self._tracks[n] = Track(rows[n : n + 1], obstacles) if track is None else track.copy()
+            begun = Track(rows[n : n + 1], obstacles, conditions) if track is None else track.copy()
+            self._tracks[n] = begun
             self._shown = len(self._tracks[n].ticks(self._simulation))
 
     def close(self) -> None:

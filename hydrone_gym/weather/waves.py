@@ -12,10 +12,10 @@ cosh k(z + h) / sinh kh = (e^(kz) + q e^(−kz)) / (1 − q).
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym._jit import inlined
 from hydrone_gym.physics.exponentials import exp
@@ -176,6 +176,13 @@ def add_wave(swell, wave, place, velocity, time):
         swell.ay + a * wave.y,
         swell.az - upright * wave.omega * cosine,
     )
+
+
+def elevation(sea: Any, x: ArrayLike, y: ArrayLike, time: float) -> NDArray[np.float64]:
+    """Return the elevation (m) of a `Sea` at places x, y (m) and a time (s), as the kernels have it; for pictures."""
+    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    waves = (w.amplitude * np.cos(w.k * (w.x * x + w.y * y) - w.omega * time + w.phase) for w in sea)
+    return sum(waves, np.zeros(np.broadcast(x, y).shape))
 
 
 @inlined

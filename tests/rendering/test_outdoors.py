@@ -1,0 +1,102 @@
+"""Weather in pictures: what is drawn is what is flown."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from numba import njit
+
+import hydrone_gym
+from hydrone_gym import Weather
+from hydrone_gym.cli import main
+from hydrone_gym.evaluation import fly
+from hydrone_gym.evaluation.saved import read_flights, restore
+from hydrone_gym.rendering.outdoors import CURRENT_SCALE, WIND_SCALE, barbed
+from hydrone_gym.rendering.track import moment_of
+from hydrone_gym.weather import waves
+from planners import StraightLine
+
+STORM = Weather(wind=4.0, current=0.3, wave_height=0.4, wave_period=2.5, sea="jonswap")
+
+
+def flown(**options):
+    env = gym.make("HydroneGym/AirToWater-v0", weather=STORM, num_obstacles=3, **options)
+    return env, fly(env, StraightLine.for_env(env), seed=2)
+
+
+@njit
+def _level(sea, place, time):
+    swell = waves.add_wave(waves.calm(), sea.first, place, (0.0, 0.0), time)
+    swell = waves.add_wave(swell, sea.second, place, (0.0, 0.0), time)
+    swell = waves.add_wave(swell, sea.third, place, (0.0, 0.0), time)
+    return waves.add_wave(swell, sea.fourth, place, (0.0, 0.0), time).elevation
+
+
+def test_elevation_is_that_of_the_kernel():
+    env, _ = flown()
+    sea = env.unwrapped.truth["conditions"].sea
+    places = np.random.default_rng(0).uniform(-10.0, 10.0, (50, 2))
+    drawn = waves.elevation(sea, *places.T, 7.3)
+    np.testing.assert_allclose(drawn, [_level(sea, (x, y, 0.0), 7.3) for x, y in places], atol=1e-12)
+    assert np.ptp(drawn) > 0.1
+
+
+def test_a_trace_holds_the_flight_and_its_weather():
+    env, flight = flown()
+    ticks, weather = env.unwrapped.simulation.ticks, flight.trace.weather
+    ends = np.minimum(ticks * np.arange(len(flight.states)), len(flight.trace.times) - 1)
+    np.testing.assert_array_equal(flight.trace.states[ends], flight.states)
+    assert {name: len(values) for name, values in weather.items()} == dict.fromkeys(weather, len(flight.trace.times))
+    told = env.unwrapped._core.outdoors.weather()
+    np.testing.assert_array_equal(weather["wind"][-1], told["wind"][0])
+
+
+def test_arrows_point_where_air_and_water_go():
+    env, flight = flown()
+    world, moment = env.unwrapped.world, moment_of(flight)
+    seen, weather = moment.outdoors(world), flight.trace.weather
+    np.testing.assert_allclose(np.diff(seen.wind, axis=0)[0], WIND_SCALE * weather["wind"][-1])
+    np.testing.assert_allclose(np.diff(seen.current, axis=0)[0], CURRENT_SCALE * weather["water"][-1])
+    assert f"wind {np.linalg.norm(weather['wind'][-1]):.1f} m/s" in seen.words
+    shaft, *barbs = barbed(seen.wind)
+    np.testing.assert_array_equal(shaft, seen.wind)
+    assert all(np.array_equal(barb[0], seen.wind[1]) for barb in barbs)
+    assert np.abs(seen.waves[..., 2]).max() > 0.05
+
+
+def test_still_weather_has_nothing_to_draw():
+    env = gym.make("HydroneGym/AirToWater-v0", num_obstacles=3)
+    flight = fly(env, StraightLine.for_env(env), seed=2)
+    assert flight.trace.weather == {}
+    assert moment_of(flight).outdoors(env.unwrapped.world) is None
+
+
+@pytest.mark.parametrize("weather", [STORM, Weather(wind=3.0), Weather(current=0.3), Weather(wave_height=0.3)])
+def test_pictures_show_it(weather):
+    def picture(weather):
+        env = gym.make("HydroneGym/AirToWater-v0", weather=weather, num_obstacles=3, render_mode="rgb_array")
+        env.reset(seed=0)
+        env.step(env.unwrapped._core.episodes.rows["reference"][0])
+        return env.render()
+
+    assert (picture(weather) != picture(hydrone_gym.Weather())).any(axis=2).sum() > 200
+
+
+def test_a_saved_flight_flies_again_in_its_weather(tmp_path):
+    given = ["--policy", "straight-line", "--mission", "random", "--weather", "2", "--out", str(tmp_path)]
+    main(["fly", *given, "--no-figures"])
+    (saved,) = read_flights(tmp_path / "flight.json")
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=len(saved.scenario.obstacles))
+    again = restore(saved, env.unwrapped.simulation)
+    np.testing.assert_array_equal(again.states, saved.states)
+    assert again.trace.weather["wind"].any()
+
+
+def test_a_snapshot_keeps_the_path_flown_in_weather():
+    env = gym.make("HydroneGym/AirToWater-v0", weather=STORM, num_obstacles=3, render_mode="rgb_array")
+    env.reset(seed=4)
+    for _ in range(3):
+        env.step(np.array([-8.0, -8.0, 6.0, 0.0]))
+    snapshot, before = env.unwrapped.get_state(), env.render()
+    env.step(np.array([-8.0, -8.0, 6.0, 0.0]))
+    env.unwrapped.set_state(snapshot)
+    np.testing.assert_array_equal(env.render(), before)
