@@ -35,5 +35,3 @@ def play_in_weather(simulation: Simulation, rows, references, conditions, obstac
         simulation.advance(rows, np.ascontiguousarray(reference), flat, closest, count, weather=conditions)
     near = closest.reshape(len(flat), count, lanes).transpose(0, 2, 1)
     return rows, near.reshape(len(flat) * lanes, count)[:n]
-
-
