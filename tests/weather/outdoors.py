@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hydrone_gym.simulation.conditions import CONDITIONS, begin_conditions, climate_of, give_streams
+from hydrone_gym.simulation.conditions import CONDITIONS, begin_conditions, climate_of
 from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.weather import Weather
@@ -16,10 +16,9 @@ def conditions_for(rows, lanes, weather=None, *, vehicle=HYDRONE, spread=None, s
     weather = weather or Weather()
     blocks = -(-len(rows) // lanes)
     conditions, order = np.zeros((blocks, CONDITIONS * lanes)), np.arange(len(rows))
-    keys = np.random.default_rng(seed).integers(0, 2**32, (len(rows), 2)).astype(np.float64)
-    give_streams(conditions, lanes, order, keys)
+    streams = np.random.default_rng(seed).integers(0, 2**32, (len(rows), 3)).astype(np.float64)
     climates = climate_of(vehicle, weather, weather.spread if spread is None else spread, DEPTH)[None]
-    begin_conditions(conditions, lanes, rows, order, climates, np.zeros(len(rows), np.int64))
+    begin_conditions(conditions, lanes, rows, order, streams, climates, np.zeros(len(rows), np.int64))
     return conditions
 
 
