@@ -108,7 +108,8 @@ _FLUID = offsets_of(Fluid)
 
 def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float) -> np.ndarray:
     """Pack what episodes of a vehicle in a weather are drawn from, over water of a depth (m)."""
-    directions = weather.wind_direction, weather.current_direction, weather.wave_direction
+    given = weather.wind_direction, weather.current_direction, weather.wave_direction
+    to_wind, to_current, to_waves = (math.nan if direction is None else direction for direction in given)
     numbers = packed(
         Climate(
             hull_of(vehicle),
@@ -116,8 +117,10 @@ def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float)
             winds.wind_params(weather.wind, weather.turbulence, weather.shear, TICK),
             currents.current_params(weather.current, weather.current_variation, TICK),
             waves.sea_params(weather.wave_height, weather.wave_period, weather.sea == "jonswap", depth),
-            *(math.nan if direction is None else direction for direction in directions),
-            0.0 if weather.extra is None else 1.0,
+            to_wind,
+            to_current,
+            to_waves,
+            float(weather.extra is not None),
         )
     )
     extra = np.zeros(MOST)
