@@ -141,7 +141,8 @@ told = []
 env.reset(seed=12)
 for k in range(60):
     *_, over, late, info = env.step(numpy.array([k % 7 - 3.0, k % 5 - 2.0, 4.0 if k < 30 else -2.0, 0.1]))
-    told.append([env.truth["state"].tolist(), list(info["weather"]["wind"]), list(info["weather"]["water"]), info["energy"]])
+    wind, water = info["weather"]["wind"].tolist(), info["weather"]["water"].tolist()
+    told.append([env.truth["state"].tolist(), wind, water, info["energy"]])
     if over or late:
         env.reset()
 json.dump(told, sys.stdout)
@@ -349,14 +350,14 @@ def test_one_row_of_several_brings_weather():
     """Into a vector environment made without: its row is the single environment, the others know nothing of it."""
     scenarios = [None, GALE, None, DIVE]
     rows, envs = native(4, time_limit=20.0), [make(time_limit=20.0) for _ in range(4)]
-    observation, info = rows.reset(seed=40, options={"scenario": scenarios})
+    observation, _ = rows.reset(seed=40, options={"scenario": scenarios})
     for k, env in enumerate(envs):
         expected = env.reset(seed=40 + k, options={"scenario": scenarios[k]} if scenarios[k] else None)
         assert_same(row_of(observation, k), expected[0])
     walk, over = Walk(3, rows.single_action_space, "world"), np.zeros(4, bool)
     for _ in range(120):
         actions = walk(observation, 4)
-        observation, rewards, terminated, truncated, info = rows.step(actions)
+        observation, rewards, terminated, truncated, _ = rows.step(actions)
         for k, env in enumerate(envs):
             expected = (env.reset()[0], 0.0) if over[k] else env.step(actions[k])
             assert_same(row_of(observation, k), expected[0])

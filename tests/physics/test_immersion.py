@@ -1,6 +1,7 @@
 """A partly submerged hull in moving fluids: what takes energy, what conserves it, and what does not jump."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def test_energy_is_conserved_through_the_surface(velocity):
     assert shares.min() == 0.0
     assert shares.max() == 1.0
     assert errors[-1] < 0.01 * 12.6 * 0.5
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in itertools.pairwise(errors):
         assert 1.7 < coarse / fine < 2.4, errors
 
 

@@ -1,4 +1,4 @@
-"""The closed loop of `closed_loop` in weather: SciPy integrates the oracle of a hull outdoors between control instants."""
+"""The closed loop of `closed_loop` in weather: SciPy integrates the oracle of a hull outdoors in between."""
 
 import numpy as np
 from scipy.integrate import odeint
@@ -33,8 +33,9 @@ class OutdoorLoop(ClosedLoop):
         remaining = DT
         while remaining > 0.0:
             wanted, air, began = self.speeds(moving, remaining), bool(self.air), self.time
+            now = np.concatenate([self.state, self.rotors])
 
-            def after(duration, start=np.concatenate([self.state, self.rotors]), air=air, wanted=wanted, began=began):
+            def after(duration, start=now, air=air, wanted=wanted, began=began):
                 if duration <= 0.0:
                     return start
                 rate = lambda y, t: outdoors.derivative(  # noqa: E731
