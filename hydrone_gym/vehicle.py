@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 
 WATER_DENSITY = 1000.0  # kg/m^3, Table 1
 AIR_DENSITY = 1.293  # kg/m^3, Table 1
+LEAST_HEIGHT = 0.0025  # m: a crossing at 0.5 m/s would skip a lower hull in one physics step
 
 
 def _check_numbers(instance: object) -> None:
     """Raise ValueError unless every numeric field of a dataclass is finite and obeys the sign its metadata names."""
     for spec in dataclasses.fields(instance):  # type: ignore[arg-type]
         value = getattr(instance, spec.name)
-        if dataclasses.is_dataclass(value) or isinstance(value, str):
+        if not spec.metadata:  # a name, or gains
             continue
         where = f"{type(instance).__name__}.{spec.name}"
         unit, sign = spec.metadata["unit"], spec.metadata["sign"]
@@ -110,8 +111,8 @@ class Vehicle:
     along body axis i is ``density * drag[i] * abs(v_i) * v_i``. From `height` to `medium_delay` the defaults are the
     paper's ideal, and planners believe in it whatever is given: a hull of some height is partly submerged over it,
     rotors follow their speed with a first-order lag, drag against the air in their plane by ``rotor_drag`` times their
-    speed, and in water thrust by ``curve[0] + curve[1] * abs(n) + curve[2] * n**2`` instead of `thrust_water` (a curve
-    that begins with 0 is none); the water below carries rotors of `near_water_radius`; and the controller notices
+    speed, and in water thrust by ``curve[0] + curve[1] * abs(n) + curve[2] * n**2`` instead of `thrust_water` (three
+    zeros are none); the water below carries rotors of `near_water_radius`; and the controller notices
     another medium after `medium_delay`. Raises ValueError naming the field, the rule and the
     unit for a value that is not finite or has the wrong sign.
     """
@@ -154,6 +155,15 @@ class Vehicle:
             raise ValueError(
                 f"Vehicle.volume must displace more than the mass (the paper requires rho V > m): {self.volume!r} m^3 "
                 f"of water weigh {WATER_DENSITY * self.volume:g} kg, the vehicle {self.mass!r} kg"
+            )
+        if 0.0 < self.height < LEAST_HEIGHT:
+            raise ValueError(f"Vehicle.height must be 0 or at least {LEAST_HEIGHT} m, got {self.height!r}")
+        first, second, third = self.thrust_water_curve
+        tried = [self.rotor_limit_water * share / 100 for share in range(101)]
+        if any(self.thrust_water_curve) and min(first + (second + third * n) * n for n in tried) <= 0.0:
+            raise ValueError(
+                "Vehicle.thrust_water_curve must be positive (m^4/rpm^2) at every speed up to rotor_limit_water "
+                f"({self.rotor_limit_water!r} rpm), or (0, 0, 0) for thrust_water, got {self.thrust_water_curve!r}"
             )
         if self.hover_speed >= self.rotor_limit_air:
             raise ValueError(

@@ -256,9 +256,9 @@ class EpisodeBatch:
 
         Their weather is that of the options, but for `scenarios` (k,) that carry one.
         """
-        begin_rows(self.episodes, missions, rows, self._flown[0][1])
-        if self.outdoors.admit(scenarios):
+        if self.outdoors.admit(self.episodes.rows, scenarios):
             self._bind()
+        begin_rows(self.episodes, missions, rows, self._flown[0][1])
         self.outdoors.begin(self.episodes.rows, rows, self.generators, scenarios)
         for row in rows.tolist():
             self.transitions[row] = []
@@ -268,9 +268,11 @@ class EpisodeBatch:
             if look:
                 self.look(rows)
 
-    def restore_outdoors(self, conditions: NDArray[np.float64], disturbance: type | None) -> None:
+    def restore_outdoors(
+        self, conditions: NDArray[np.float64], disturbance: type | None, streams: NDArray[np.float64]
+    ) -> None:
         """Go back to the weather of a snapshot."""
-        self.outdoors.restore(conditions, disturbance)
+        self.outdoors.restore(conditions, disturbance, streams)
         self._bind()
 
     def spheres(self, row: int) -> NDArray[np.float64]:

@@ -41,8 +41,9 @@ class Snapshot:
     random_state: dict[str, Any]  # of the bit generator that draws scenarios
     seed: int | None  # that it was made from
     egocentric: tuple[NDArray[np.float64], NDArray[np.float32]]  # memory and last observation, if that is the interface
-    conditions: NDArray[np.float64]  # weather, its stream, and the vehicle as it is; empty where they are not simulated
+    conditions: NDArray[np.float64]  # weather and the vehicle as it is; empty where they are not simulated
     disturbance: type | None  # class of the disturbance in them
+    streams: NDArray[np.float64]  # that conditions are drawn from
     track: Track | None  # flown so far, for pictures; None without `render_mode`
 
 
@@ -237,6 +238,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             egocentric=(core.memory.copy(), core.seen.copy()),
             conditions=core.outdoors.conditions.copy(),
             disturbance=core.outdoors.extra,
+            streams=core.outdoors.streams.copy(),
             track=core.screen.track(0),
         )
 
@@ -252,7 +254,7 @@ class HydroneEnv(gym.Env[Any, Any]):
             listed = ", ".join(f"{name} (snapshot {theirs!r}, here {own!r})" for name, theirs, own in pairs)
             raise ValueError(f"snapshot is of an environment with other options: {listed}")
         core, self._scenario = self._core, snapshot.scenario
-        core.restore_outdoors(snapshot.conditions, snapshot.disturbance)
+        core.restore_outdoors(snapshot.conditions, snapshot.disturbance, snapshot.streams)
         self._outcome = float(snapshot.episodes.report[0, OUTCOME])
         own: list[np.ndarray] = [*core.episodes, core.memory, core.seen]
         for array, kept in zip(own, (*snapshot.episodes, *snapshot.egocentric), strict=True):

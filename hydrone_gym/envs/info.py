@@ -22,7 +22,7 @@ def info_of(
     report: Sequence[float], transitions: Sequence[dict[str, Any]], weather: dict[str, NDArray[np.float64]]
 ) -> dict[str, Any]:
     """Return what `info` holds, from one row of `REPORT`, its crossings so far, and the weather around it (1,)."""
-    outdoors = {"weather": {name: values[0].tolist() for name, values in weather.items()}} if weather else {}
+    around = {name: values[0].copy() if values.ndim > 1 else values[0].item() for name, values in weather.items()}
     return {
         "outcome": _OUTCOMES[int(report[OUTCOME])],
         "time": report[OUTCOME + 1],
@@ -30,7 +30,7 @@ def info_of(
         "clearance": report[OUTCOME + 3],
         "transitions": [dict(crossing) for crossing in transitions],
         "reward_terms": dict(zip(TERMS, report)),
-        **outdoors,
+        **({"weather": around} if around else {}),
     }
 
 

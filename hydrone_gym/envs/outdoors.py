@@ -10,7 +10,6 @@ from hydrone_gym.simulation.conditions import (
     CONDITIONS,
     begin_conditions,
     climate_of,
-    give_streams,
     key_of,
     weather_at,
 )
@@ -30,6 +29,7 @@ class Outdoors:
         """Make room, if the options ask for weather."""
         self.conditions: NDArray[np.float64] = STILL
         self.extra: type | None = None  # class of the disturbance that the kernel knows
+        self.streams = np.zeros((count, 3))  # the key of a row's episodes, two numbers, and how many have begun
         self.reseeded = np.ones(count, bool)  # rows whose stream is still to come from their generator's seed
         self._options, self._count, self._lanes = options, count, lanes
         self._weathers: list[Weather] = []  # that episodes are drawn from, the first one that of the options
@@ -49,21 +49,25 @@ class Outdoors:
         self._climate(self._options.the_weather)
         self.extra = self.extra if weather.extra is None else type(weather.extra)
 
-    def admit(self, scenarios: Sequence[Scenario | None]) -> bool:
+    def admit(self, rows: np.ndarray, scenarios: Sequence[Scenario | None]) -> bool:
         """Make room for what scenarios carry; return whether that asks for another kernel or other memory.
 
-        Raises ValueError for a disturbance of another class than the one that is known here.
+        Where there was no weather, rows that are on their way go on in still air. Raises ValueError for disturbances of
+        more than one class.
         """
+        weathers = [each.weather for each in scenarios if each is not None and each.weather is not None]
+        known = self.extra
+        for weather in weathers:
+            kind = known if weather.extra is None else type(weather.extra)
+            if known is not None and kind is not known:
+                raise ValueError(f"a scenario's disturbance must be a {known.__name__} here, got {weather.extra!r}")
+            known = kind
         before = self.weathered, self.extra
-        for scenario in scenarios:
-            weather = None if scenario is None else scenario.weather
-            if weather is None:
-                continue
-            if self.extra is not None and weather.extra is not None and type(weather.extra) is not self.extra:
-                raise ValueError(
-                    f"a scenario's disturbance must be a {self.extra.__name__} here, got {weather.extra!r}"
-                )
+        for weather in weathers:
             self._open(weather)
+        if self.weathered and not before[0]:
+            every = np.arange(self._count)
+            self._draw(rows, every, np.zeros_like(every))
         return (self.weathered, self.extra) != before
 
     def begin(
@@ -74,18 +78,20 @@ class Outdoors:
         scenarios: Sequence[Scenario | None],
     ) -> None:
         """Draw weather and vehicles of the episodes that rows `order` (k,) begin, in what their `scenarios` carry."""
-        if not self.weathered:
-            return
         new = order[self.reseeded[order]]
         if new.size:
-            keys = np.array([key_of(generators[row]) for row in new.tolist()])
-            give_streams(self.conditions, self._lanes, new, keys)
+            self.streams[new] = [(*key_of(generators[row]), 0.0) for row in new.tolist()]
             self.reseeded[new] = False
-        which = np.zeros(len(order), np.int64)
-        for k, scenario in enumerate(scenarios):
-            if scenario is not None and scenario.weather is not None:
-                which[k] = self._climate(scenario.weather)
-        begin_conditions(self.conditions, self._lanes, rows, order, self._climates, which)
+        if self.weathered:
+            which = np.zeros(len(order), np.int64)
+            for k, scenario in enumerate(scenarios):
+                if scenario is not None and scenario.weather is not None:
+                    which[k] = self._climate(scenario.weather)
+            self._draw(rows, order, which)
+        self.streams[order, 2] += 1.0
+
+    def _draw(self, rows: np.ndarray, order: NDArray[np.int64], which: NDArray[np.int64]) -> None:
+        begin_conditions(self.conditions, self._lanes, rows, order, self.streams, self._climates, which)
 
     def _climate(self, weather: Weather) -> int:
         """Index of a weather among those that episodes are drawn from."""
@@ -107,9 +113,9 @@ class Outdoors:
         """Return what moves around all rows as of the last tick, see `weather_at`; nothing without weather."""
         return weather_at(self.conditions, self._lanes, self._count) if self.weathered else {}
 
-    def restore(self, kept: NDArray[np.float64], extra: type | None) -> None:
-        """Go back to the conditions of a snapshot and the disturbance in them; empty where there were none."""
-        self.reseeded[:] = not kept.size
+    def restore(self, kept: NDArray[np.float64], extra: type | None, streams: NDArray[np.float64]) -> None:
+        """Go back to what a snapshot kept: conditions, empty where there were none, their disturbance, and streams."""
         self.conditions, self.extra = kept.copy() if kept.size else STILL, extra
+        self.streams[:], self.reseeded[:] = streams, False
         if kept.size:
             self._climate(self._options.the_weather)

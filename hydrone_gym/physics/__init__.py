@@ -71,8 +71,8 @@ Shaft power
 -----------
     P = Σ ρ η |Ω_i|³ 2π/60      W;  η = κ ζ with κ = 0.0125 m in air, the tabled 1e-11 in water
 
-Two parameter sets of this one model
-------------------------------------
+Parameter sets of this one model
+--------------------------------
                             HYDRONE ("paper")               HYDRONE_PHYSICAL ("physical")
     l_ψ            m        0.27                            0.0125                              E4
     N              m⁵       (1.25, 1.25, 4.99) e-2          (2.5, 2.5, 0.6) e-4                 E6
@@ -80,6 +80,11 @@ Two parameter sets of this one model
     G                       as printed                      buoyancy only                       E14
     V              m³       1.6e-3 (24 % afloat)            1.35e-3 (5 %)                       E15
     in both sets: m = 1.2860 kg, g = 9.78 m/s², C = (1.25, 1.25, 4.99) e-2 m²
+
+A third, HYDRONE_2021 ("hydrone-2021"), is the paper set with N = (0.625, 0.625, 1.25) e-2 m⁵ (E6) and with what
+`immersion` adds: a hull 0.135 m high, rotors that follow within 33 ms, and in water
+
+    ζ(n) = π r⁴ (2.3281e-11 n² − 1.4307e-7 n + 1.0654e-3),  r = 0.0275 m, n = |Ω| in rpm
 
 Equilibria: hover at 3150.5 rpm, 3.144 N a rotor; neutral in water with rotors 1 and 3 at −972.7 rpm (paper set) or
 −439.1 rpm (physical set).
@@ -102,4 +107,6 @@ Files
     parameters      a Vehicle flattened to the coefficients above, one set a medium
     rotors          thrust, forces and moments, shaft power
     dynamics        accelerations, the step, and state_derivative for Python
+    immersion       what these equations leave out: a hull partly under water, moving fluids, rotors that lag
+    exponentials    exponential and logarithm as plain arithmetic
 """

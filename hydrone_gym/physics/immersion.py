@@ -12,7 +12,7 @@ Here s, the submerged share of the hull, goes from 0 to 1 over the hull's height
     + s (ρ a_m + ρ V) u̇                                 the water's acceleration: added mass and displaced water
     − ṁ v_r + ½ (dm'/dz) |v_r|² e_z                     added mass that comes and goes: the equations of a body whose
                                                         kinetic energy is ½ m'(z) |v_r|²
-    − Σ k_d Ω_i (v_r in the rotors' plane)              rotor drag in air, by 1 − s_i
+    − Σ k_d Ω_i (v − air, in the rotors' plane)         rotor drag, by 1 − s_i
 
 A hull without height (the default) is in air or in water, as the nominal one is, and its numbers are the nominal
 model's bit for bit when nothing moves.
@@ -270,9 +270,7 @@ def immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after, 
         between(air[1], water[1], dense),
         between(air[2], water[2], dense),
     )
-    bx, by, _ = to_body(attitude, state.vx, state.vy, state.vz)
+    bx, by, _ = to_body(attitude, state.vx - air[0], state.vy - air[1], state.vz - air[2])
     flapping = real.rotor_drag * turning * medium.inverse_mass
-    a = BodyAcceleration(
-        a.x - flapping * (bx - around[0]), a.y - flapping * (by - around[1]), a.z, a.roll, a.pitch, a.yaw
-    )
+    a = BodyAcceleration(a.x - flapping * bx, a.y - flapping * by, a.z, a.roll, a.pitch, a.yaw)
     return integrate(state, attitude, a, medium, around, dt), medium

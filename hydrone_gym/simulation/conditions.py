@@ -57,13 +57,6 @@ class Noticed(NamedTuple):
     waited: float  # s that they have differed
 
 
-class Stream(NamedTuple):
-    """Where the keys of a row's episodes come from."""
-
-    key: Key
-    episodes: float  # begun so far
-
-
 class Chances(NamedTuple):
     """What a disturbance draws an episode with: even between 0 and 1."""
 
@@ -88,8 +81,8 @@ class Conditions(NamedTuple):
     current: CurrentParams
     headings: Headings
     sea: Sea
-    stream: Stream
-    chances: Chances  # a disturbance's numbers come after
+    chances: Chances
+    disturbed: float  # 1 where there is a disturbance, whose numbers come after
 
 
 class Climate(NamedTuple):
@@ -103,6 +96,7 @@ class Climate(NamedTuple):
     wind_direction: float  # rad; not a number if it is drawn
     current_direction: float
     wave_direction: float
+    disturbed: float  # 1 if a disturbance's numbers come after
 
 
 AT = offsets_of(Conditions)
@@ -114,7 +108,8 @@ _FLUID = offsets_of(Fluid)
 
 def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float) -> np.ndarray:
     """Pack what episodes of a vehicle in a weather are drawn from, over water of a depth (m)."""
-    directions = weather.wind_direction, weather.current_direction, weather.wave_direction
+    given = weather.wind_direction, weather.current_direction, weather.wave_direction
+    to_wind, to_current, to_waves = (math.nan if direction is None else direction for direction in given)
     numbers = packed(
         Climate(
             hull_of(vehicle),
@@ -122,7 +117,10 @@ def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float)
             winds.wind_params(weather.wind, weather.turbulence, weather.shear, TICK),
             currents.current_params(weather.current, weather.current_variation, TICK),
             waves.sea_params(weather.wave_height, weather.wave_period, weather.sea == "jonswap", depth),
-            *(math.nan if direction is None else direction for direction in directions),
+            to_wind,
+            to_current,
+            to_waves,
+            float(weather.extra is not None),
         )
     )
     extra = np.zeros(MOST)
@@ -138,13 +136,12 @@ def _heading(direction, share):
 
 
 @inlined
-def _begin(memory, i, lanes, row, numbers):
-    """Draw the conditions of the episode that lane i begins."""
-    climate, stream = gather(numbers, 0, 0, 1, Climate), gather(memory, AT.stream, i, lanes, Stream)
+def _begin(memory, i, lanes, row, numbers, key):
+    """Draw the conditions of the episode with a key that lane i begins."""
+    climate = gather(numbers, 0, 0, 1, Climate)
     for k in range(MOST):
         memory[(EXTRA + k) * lanes + i] = numbers[_EXTRA_OF_CLIMATE + k]
-    key = derived(stream.key, stream.episodes)
-    scatter(memory, AT.stream, i, lanes, Stream(stream.key, stream.episodes + 1.0))
+    scatter(memory, AT.disturbed, i, lanes, climate.disturbed)
     scatter(memory, AT.key, i, lanes, key)
     hull = draw_hull(climate.hull, climate.spread, key, _VEHICLE)
     vehicle = params_of(hull)
@@ -213,30 +210,23 @@ def conditions_of(conditions: NDArray[np.float64], lanes: int, row: int) -> Cond
     return unpacked(Conditions, block)
 
 
-def give_streams(
-    conditions: NDArray[np.float64], lanes: int, rows: NDArray[np.int64], keys: NDArray[np.float64]
-) -> None:
-    """Let the episodes of rows (k,) come from keys (k, 2), from the first one on."""
-    blocks = conditions.reshape(len(conditions), CONDITIONS, lanes)
-    blocks[rows // lanes, AT.stream : AT.stream + 2, rows % lanes] = keys
-    blocks[rows // lanes, AT.stream + 2, rows % lanes] = 0.0
-
-
 @kernel
-def begin_conditions(conditions, lanes, rows, order, climates, which):
-    """Draw the conditions of episodes that begin.
+def begin_conditions(conditions, lanes, rows, order, streams, climates, which):
+    """Draw the conditions of episodes that begin, or go on from where they are.
 
     Args:
         conditions: (blocks, CONDITIONS * lanes), updated.
         lanes: rows a block.
         rows: (n,) dtype `ROW`, placed already.
         order: (k,) which rows, int64.
+        streams: (n, 3) the key of all episodes of a row, two numbers, and which of them this one is.
         climates: (m, numbers) from `climate_of`.
         which: (k,) which of them each flies in, int64.
     """
     for k in range(order.size):
         n = order[k]
-        _begin(pointer(conditions[n // lanes]), n % lanes, lanes, rows[n], climates[which[k]])
+        key = derived(Key(streams[n, 0], streams[n, 1]), streams[n, 2])
+        _begin(pointer(conditions[n // lanes]), n % lanes, lanes, rows[n], climates[which[k]], key)
 
 
 @inlined

@@ -80,7 +80,9 @@ def sample(memory, i, lanes, b, rare, extra):
         near = near_water_factor(place[2] - swell.elevation, gather(memory, _RADIUS, i, lanes, float))
     if extra is not None:
         chances, numbers = gather(memory, AT.chances, i, lanes, Chances), gather(memory, EXTRA, i, lanes, extra)
-        more_air, more_water = flow_of(numbers, chances, place, time)
+        more = flow_of(numbers, chances, place, time)
+        here = gather(memory, AT.disturbed, i, lanes, float) > 0.0
+        more_air, more_water = select(here, more, zero_like(more))
         air, next_air = _sum(air, more_air), _sum(next_air, more_air)
         swell = waves.carried(swell, more_water)
     # where a flight has ended its time stands still, and so does its weather

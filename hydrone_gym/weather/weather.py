@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from hydrone_gym.vehicle import LEAST_HEIGHT
 from hydrone_gym.weather.disturbance import check
 from hydrone_gym.weather.waves import STEEPEST, wave_number
 
@@ -25,7 +26,6 @@ _NUMBERS = {
 }
 _DIRECTIONS = ("wind_direction", "current_direction", "wave_direction")
 _RANGES = {"rotor_lag_air": ("s", 1.0), "rotor_lag_water": ("s", 1.0), "rotor_drag": ("N s/(m rad/s)", 1e-2)}
-LEAST_HEIGHT = 0.0025  # m: a crossing at 0.5 m/s would skip a lower hull in one physics step
 SEAS = ("regular", "jonswap")
 
 
