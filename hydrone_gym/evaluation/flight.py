@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hydrone_gym.envs.hydrone_env import HydroneEnv
 from hydrone_gym.evaluation.policies import Policy
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
+from hydrone_gym.simulation.simulation import STILL, Simulation, row_at, trajectory
 from hydrone_gym.world.scenario import Scenario
 
 _TOLD = ("outcome", "time", "energy", "clearance", "transitions")  # by the last `info` of an episode
@@ -66,7 +66,8 @@ class Flight(Ending):
 def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scenario | None = None) -> Flight:
     """Fly one episode of a HyDrone environment with `interface="world"`, wrapped or not, and return its record.
 
-    The policy's memory is new; the environment draws what is flown unless a `scenario` is given.
+    The policy's memory is new; the environment draws what is flown from the `seed` unless a `scenario` is given, and
+    weather and vehicle, where they are drawn, also then.
 
     Raises TypeError for an environment of another kind, ValueError for another interface, or a scenario not for it.
     """
@@ -76,6 +77,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
     if world.options.interface != "world":
         raise ValueError(f'fly needs an environment with interface="world", got {world.options.interface!r}')
     observation, info = env.reset(seed=seed, options=None if scenario is None else {"scenario": scenario})
+    weather = world.get_state().conditions
     states, references, decisions, earned = [world.truth["state"]], [], [], 0.0
     memory, start, done = None, np.array([True]), False
     while not done:
@@ -89,7 +91,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         references.append(truth["reference"])
         earned += float(reward)  # one by one, as a batch does: sum() compensates since Python 3.12
         start, done = np.array([False]), terminated or truncated
-    trace = trace_of(world.simulation, world.scenario, states[0], np.array(references))
+    trace = trace_of(world.simulation, world.scenario, states[0], np.array(references), weather)
     return Flight(
         obstacles=len(world.scenario.obstacles),
         scenario=world.scenario,
@@ -106,15 +108,20 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
 
 
 def fly_worlds(
-    env: gym.vector.VectorEnv, policy: Policy, *, seed: int | None = None, scenarios: Sequence[Scenario] | None = None
+    env: gym.vector.VectorEnv,
+    policy: Policy,
+    *,
+    seed: int | Sequence[int] | None = None,
+    scenarios: Sequence[Scenario] | None = None,
 ) -> list[Ending]:
     """Fly a policy once in each row of a vector of environments, deterministically, all at once.
 
     Args:
         env: from `gym.make_vec(id, n, vectorization_mode="vector_entry_point")`, `interface="world"`.
         policy: chooses the references of all rows that still fly; its memory is new.
-        seed: row i flies the world that a single environment draws from ``seed + i``.
-        scenarios: what to fly, one a row, None for drawn worlds.
+        seed: row i flies the world, weather and vehicle that a single environment draws from ``seed + i``, or from
+            entry i of several.
+        scenarios: the worlds to fly, one a row, None for drawn ones.
 
     Returns how the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
     """
@@ -185,8 +192,15 @@ def _rows_of(memory: Any, rows: NDArray[np.intp]) -> Any:
 
 
 def trace_of(
-    simulation: Simulation, scenario: Scenario, start: NDArray[np.float64], references: NDArray[np.float64]
+    simulation: Simulation,
+    scenario: Scenario,
+    start: NDArray[np.float64],
+    references: NDArray[np.float64],
+    weather: NDArray[np.float64] = STILL,
 ) -> Trace:
-    """Play references again from a state, tick by tick: the same kernel, so the same flight bit for bit."""
+    """Play references again from a state, tick by tick: the same kernel, so the same flight bit for bit.
+
+    `weather` are the conditions it began in, where there are some, see `trajectory`.
+    """
     row = row_at(start, np.array(scenario.goal))
-    return Trace(*trajectory(simulation, row, references, scenario.obstacles)[:3])
+    return Trace(*trajectory(simulation, row, references, scenario.obstacles, weather)[:3])

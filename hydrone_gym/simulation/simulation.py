@@ -105,6 +105,7 @@ def trajectory(
     row: np.ndarray,
     references: ArrayLike,
     obstacles: ArrayLike | None = None,
+    weather: NDArray[np.float64] = STILL,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], np.ndarray]:
     """Play a sequence of references from a row and sample every tick, with the same numbers as whole periods give.
 
@@ -113,15 +114,20 @@ def trajectory(
         row: (1,) dtype `ROW`; not changed.
         references: (K, 4) one reference a period (m, m, m, rad).
         obstacles: (M, 4) spheres x, y, z, r in m.
+        weather: (1, CONDITIONS) the row's `Conditions`, if the simulation has weather; not changed.
 
     Returns:
         Times (N,) in s, states (N, 12), the moving references (N, 4), and the final row. Ends early with the outcome.
+
+    Raises ValueError for a simulation with weather and no conditions, or the other way round.
     """
+    if simulation.weathered != (weather.size > 0):
+        raise ValueError(f"weather must be {'given' if simulation.weathered else 'left out'}, as in the simulation")
     # a copy, since a read-only array would compile another version of the kernel
     spheres = np.zeros((0, 4)) if obstacles is None else np.array(obstacles, dtype=np.float64)
     closest = np.full((1, len(spheres)), np.inf)
     flat = spheres.reshape(1, -1)
-    row = row.copy()
+    row, weather = row.copy(), weather.copy()
     start = row["ticks"][0]
     times, states, moving = [0.0], [row["state"][0].copy()], [row["reference"][0].copy()]
     for reference in np.asarray(references, dtype=np.float64, order="C"):
@@ -129,7 +135,7 @@ def trajectory(
         turn = (reference[3] - old[3] + np.pi) % (2.0 * np.pi) - np.pi
         move = np.append(reference[:3] - old[:3], turn)
         for tick in range(simulation.ticks):
-            simulation.advance(row, reference[None], flat, closest, len(spheres), tick, tick + 1)
+            simulation.advance(row, reference[None], flat, closest, len(spheres), tick, tick + 1, weather)
             times.append((row["ticks"][0] - start) * TICK)
             states.append(row["state"][0].copy())
             moving.append(old + move * ((tick + 1) / simulation.ticks))
