@@ -37,8 +37,8 @@ class Evaluate:
     """
 
     suites: tuple[str, ...] = ("paper-20",)
-    """Frozen suites paper-20, dense-40, missions, density, weather-0 to weather-5 or weather for all six; held-out, flown
-    in batches; or files or folders of yours."""
+    """Frozen suites paper-20, dense-40, missions, density, weather-0 to weather-5, weather for these six; held-out,
+    flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
     worlds: int = 100  # First so many worlds of each mission.

@@ -127,7 +127,8 @@ def fly_worlds(
     """
     if env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) != AutoresetMode.NEXT_STEP:
         raise ValueError(f"fly_worlds needs autoreset_mode NextStep, got {env.metadata['autoreset_mode']}")
-    observation, _ = env.reset(seed=seed, options=None if scenarios is None else {"scenario": list(scenarios)})
+    chosen: Any = {"seed": seed, "options": None if scenarios is None else {"scenario": list(scenarios)}}
+    observation, _ = env.reset(**chosen)
     running, memory, starts = np.arange(env.num_envs), None, np.ones(env.num_envs, bool)
     returns, shares, endings = np.zeros(env.num_envs), [], {}
     while len(running):

@@ -23,7 +23,7 @@ SHA256 = {
     "dense-40-v1": "7f6ce81f26cf1542651a6e6c86c0d491c85422224666cb9af810efe7c078289a",
     "missions-v1": "72fe7b6e597693931841108dfa61107687b3401fb704cacccc65670575a7acc9",
     "density-v1": "bb01d4f06de6be8501bb4fc11780bb3f9095c7656e5854dd7d5cd5c024b35238",
-    "weather-v1": "9648190c661d00b8bb370674cef3e166951be698c861cb904c9cdc5a18896b75",  # flown at every level of weather: the suites weather-0-v1, weather-1-v1 and so on
+    "weather-v1": "9648190c661d00b8bb370674cef3e166951be698c861cb904c9cdc5a18896b75",  # the worlds of every level
 }
 HELD_OUT = 10_000_000  # seeds from here on are for evaluation; training uses those below
 MISSIONS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
@@ -207,8 +207,8 @@ def _from_folder(folder: Path) -> Suite:
 def save_suite(suite: Suite, path: str | os.PathLike[str]) -> None:
     """Write a suite to an NPZ file that `load_suite` reads; every float is restored bit for bit, nothing is pickled.
 
-    Raises ValueError where scenarios of one mission have different numbers of spheres or weather of their own, OSError if
-    writing fails.
+    Raises ValueError where scenarios of one mission have different numbers of spheres, or weather of their own, and
+    OSError if writing fails.
     """
     arrays: dict[str, NDArray] = {}
     for mission in suite.missions:
