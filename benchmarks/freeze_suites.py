@@ -58,11 +58,16 @@ def _densities() -> dict[str, tuple[str, ScenarioLaw]]:
     }
 
 
+def _all_missions() -> dict[str, tuple[str, ScenarioLaw]]:
+    return {**_experiments(), "random": ("HydroneGym/Mission-v0", ScenarioLaw())}
+
+
 RECIPES = {
     "paper-20-v1": Recipe(30_000_000, 200, _experiments(num_obstacles=20)),
     "dense-40-v1": Recipe(31_000_000, 200, _experiments(num_obstacles=40, obstacle_radius=DENSE)),
     "missions-v1": Recipe(32_000_000, 100, _random_ends()),
     "density-v1": Recipe(33_000_000, 50, _densities()),
+    "weather-v1": Recipe(34_000_000, 200, _all_missions()),
 }
 
 

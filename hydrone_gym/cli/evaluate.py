@@ -21,6 +21,7 @@ from hydrone_gym.evaluation.provenance import machine
 from hydrone_gym.evaluation.run import carry_out
 from hydrone_gym.evaluation.run_folder import LATEX, ROWS, SUMMARY, TABLES, RunFolder, write_results
 from hydrone_gym.evaluation.shown import Writer
+from hydrone_gym.evaluation.suites import in_short
 from hydrone_gym.evaluation.tables import print_tables
 from hydrone_gym.rendering.files import Width, inches
 from hydrone_gym.rendering.replay import load_viser, write_replay
@@ -36,7 +37,8 @@ class Evaluate:
     """
 
     suites: tuple[str, ...] = ("paper-20",)
-    """Frozen suites paper-20, dense-40, missions, density; held-out, flown in batches; or files or folders of yours."""
+    """Frozen suites paper-20, dense-40, missions, density, weather-0 to weather-5, weather for these six; held-out,
+    flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
     worlds: int = 100  # First so many worlds of each mission.
@@ -73,7 +75,8 @@ class Evaluate:
         labels = [policy.label for policy in plan.policies]
         if self.baseline is not None and self.baseline not in labels:
             raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")
-        out = Path("evaluations") / "+".join(suite.name for suite in plan.suites) if self.out is None else self.out
+        names = in_short([suite.name for suite in plan.suites])
+        out = Path("evaluations") / "+".join(names) if self.out is None else self.out
         with held(out):
             folder = RunFolder(out, plan, overwrite=self.overwrite)
             if self.report is not None:

@@ -13,11 +13,13 @@ from urllib.parse import quote
 
 import jinja2
 
+from hydrone_gym.evaluation.levels import level_tables
 from hydrone_gym.evaluation.page_figures import FIGURES, SEVERAL, charts_of, write_figures
 from hydrone_gym.evaluation.plan import Plan, plan_of
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.run_folder import LATEX, ROWS, SUMMARY, TABLES, Stored, read_stored, write_whole
 from hydrone_gym.evaluation.shown import REPLAYS, Shown, Writer, shown_flights, write_replays
+from hydrone_gym.evaluation.suites import in_short, level_of
 from hydrone_gym.evaluation.summary import ALL_MISSIONS
 from hydrone_gym.evaluation.tables import Table, tables_of
 from hydrone_gym.rendering.comparison import colour
@@ -85,16 +87,18 @@ def write_report(
 def _content(stored: Stored, shown: Sequence[Shown], flown: Written, folder: Path) -> dict[str, Any]:
     """Return what the template is filled with."""
     document, suites, policies = stored.document, list(stored.arguments["suites"]), stored.policies
+    levels = level_tables(stored.summaries)
+    tables = [("Levels of weather", levels, list[Table](), "")] if levels else []
+    tables += [(suite, *_tables(stored, suite, bool(levels))) for suite in suites]
     several = f"{len(policies)} policies" if len(policies) > 1 else policies[0]
     flights, worlds = len(stored.records), len({record.key[:3] for record in stored.records})
     vehicle = f"the vehicle with its {stored.arguments['vehicle']} parameters"
     return {
-        "title": f"{several} on {_listed(suites)}",
+        "title": f"{several} on {_listed(in_short(suites))}",
         "lead": f"{flights:,} flights in {worlds:,} worlds, {vehicle}.",
         "colours": {policy: colour(index) for index, policy in enumerate(policies)},
         "facts": _facts(stored),
-        "suites": [(suite, *_tables(stored, suite)) for suite in suites],
-        "unfolded": _UNFOLDED,
+        "suites": tables,
         "shown": [(policy, [_flight(record, flown, folder) for record in records]) for policy, *records in shown],
         "command": "" if flown else _command(shown[0].worst),
         "files": {name: words for name, words in _FILES.items() if (folder / name).exists()},
@@ -129,11 +133,19 @@ def _worlds(suite: str, missions: Mapping[str, int]) -> str:
     return f"{suite}: {len(missions)} mission{'s' * (len(missions) > 1)}, {each} worlds each{names}"
 
 
-def _tables(stored: Stored, suite: str) -> tuple[list[Table], list[list[Table]]]:
-    """Return the tables of all missions of a suite together, if they are several, and those of each."""
+def _tables(stored: Stored, suite: str, levels: bool) -> tuple[list[Table], list[Table], str]:
+    """Return the tables of a suite that are in sight, those that are folded away, and what to call these.
+
+    Where there are tables of several `levels`, those of a level are folded.
+    """
     within = [summary for summary in stored.summaries if summary.suite == suite]
-    each = [tables_of([summary]) for summary in within if summary.mission != ALL_MISSIONS]
-    return tables_of([summary for summary in within if summary.mission == ALL_MISSIONS]), each
+    each = [summary for summary in within if summary.mission != ALL_MISSIONS]
+    first = [summary for summary in within if summary.mission == ALL_MISSIONS]
+    if levels and level_of(suite) is not None:
+        return [], tables_of([*first, *each]), "Tables of this level"
+    if len(each) > _UNFOLDED:
+        return tables_of(first), tables_of(each), f"Tables of each of the {len(each)} missions"
+    return tables_of([*first, *each]), [], ""
 
 
 def _flight(record: Record, flown: Written, folder: Path) -> dict[str, str]:

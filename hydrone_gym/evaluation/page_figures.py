@@ -3,28 +3,31 @@
 import math
 import re
 from base64 import b64encode
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hydrone_gym.evaluation.levels import by_policy, flown_levels, rates
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, LIMITS, MissionSummary
-from hydrone_gym.rendering.comparison import plot_decisions, plot_density, plot_distributions, plot_success
+from hydrone_gym.rendering.comparison import plot_decisions, plot_distributions, plot_rates, plot_success
 from hydrone_gym.rendering.files import save_figure, to_svg
+from hydrone_gym.weather.weather import LEVELS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SEVERAL = 4  # missions of a suite that are shown one by one; of more, all together
+SEVERAL = 4  # missions that are shown one by one; of more, all together
 _LEAST_MS = 1e-3  # a logarithmic axis has no zero
 _ROUGH, _TILTED = LIMITS.rough_speed, math.degrees(LIMITS.rough_tilt)
 FIGURES = "figures"  # folder beside the page
 _BOX = "Boxes span the quartiles around the median, whiskers the 5th to the 95th percentile; dots are flights beyond."
 _CAPTIONS = {
+    "Success against weather": """Share of all flights that arrived, with the 95 % Wilson interval. The worlds are
+the same at every level; policies stand side by side around it.""",
     "Success": "Share of all flights that arrived, with the 95 % Wilson interval.",
     "Success against density": """Share of all flights that arrived, over all missions of a suite, with the 95 % Wilson
 interval. Policies stand side by side around their number of obstacles.""",
@@ -82,10 +85,12 @@ _SPEEDS = (
 def charts_of(records: Sequence[Record], summaries: Sequence[MissionSummary]) -> list[Chart]:
     """Draw all figures; those for which there is nothing to draw are left out."""
     policies = list(dict.fromkeys(record.policy for record in records))
-    missions = Counter(s.suite for s in summaries if s.mission != ALL_MISSIONS)
-    shown = [s for s in summaries if (missions[s.suite] <= SEVERAL) != (s.mission == ALL_MISSIONS)]
-    rest = [s for s in summaries if missions[s.suite] > SEVERAL and s.mission != ALL_MISSIONS]
+    shown = each = [s for s in summaries if s.mission != ALL_MISSIONS]
+    if len(each) > SEVERAL:
+        shown = list({s.suite: s for s in summaries}.values())  # the missions together come after each of them
+    rest = [s for s in each if s not in shown]
     panels = {
+        "Success against weather": _weather(policies, summaries),
         "Success": [_success(policies, summary) for summary in shown],
         "Success against density": _density(policies, records),
         "Clearance": _boxes(policies, records, shown, _CLEARANCE),
@@ -128,8 +133,22 @@ def _density(policies: Sequence[str], records: Sequence[Record]) -> list[Panel]:
         flown = [record for record in records if record.suite == suite]
         counts = sorted({record.obstacles for record in flown})
         if len(counts) > 1:
-            rates = {policy: [_rate(flown, policy, count) for count in counts] for policy in policies}
-            panels.append(_panel(plot_density(counts, rates, title=suite), f"Success against density: {suite}"))
+            shares = {policy: [_rate(flown, policy, count) for count in counts] for policy in policies}
+            figure = plot_rates(counts, shares, "number of obstacles", title=suite)
+            panels.append(_panel(figure, f"Success against density: {suite}"))
+    return panels
+
+
+def _weather(policies: Sequence[str], summaries: Sequence[MissionSummary]) -> list[Panel]:
+    panels = []
+    label = "level, wind (m/s), current (m/s), waves (m)"
+    for mission, levels in flown_levels(summaries).items():
+        flown = by_policy(levels)
+        shares = {policy: rates(flown.get(policy, {}), list(levels)) for policy in policies}
+        weathers = [LEVELS[level] for level in levels]
+        ticks = [f"{k}\n{w.wind:g}\n{w.current:g}\n{w.wave_height:g}" for k, w in zip(levels, weathers, strict=True)]
+        figure = plot_rates(list(levels), shares, label, ticks=ticks, whole=True, title=mission)
+        panels.append(_panel(figure, f"Success against weather: {mission}"))
     return panels
 
 

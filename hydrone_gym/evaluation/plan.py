@@ -20,7 +20,7 @@ from hydrone_gym.evaluation.flight import fly, fly_worlds
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory, PolicySource, find_policies, told
 from hydrone_gym.evaluation.provenance import sources
 from hydrone_gym.evaluation.records import Key, Record, record_of
-from hydrone_gym.evaluation.suites import Suite, load_suite
+from hydrone_gym.evaluation.suites import HELD_OUT, Suite, load_suite, load_suites
 from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.scenario import Scenario
 
@@ -58,6 +58,11 @@ class Job:
     def keys(self) -> list[Key]:
         """The keys of its records, in order."""
         return [(self.suite, self.mission, world, self.policy.label) for world, _ in self.worlds]
+
+    @property
+    def weather_seeds(self) -> list[int]:
+        """What weather and vehicle of each world are drawn from: the same for every policy and in all suites."""
+        return [HELD_OUT + world for world, _ in self.worlds]
 
     def make_env(self) -> gym.Env:
         """Make its environment."""
@@ -165,7 +170,8 @@ def make_plan(
             raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
     named_vehicle(vehicle)
     several = [suites] if isinstance(suites, str | Path | Suite) else list(suites)
-    loaded = [suite if isinstance(suite, Suite) else load_suite(suite, worlds) for suite in several]
+    found = [[suite] if isinstance(suite, Suite) else load_suites(suite, worlds) for suite in several]
+    loaded = [suite for suites in found for suite in suites]
     names = [suite.name for suite in loaded]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"there must be at least one suite, and suites must have different names, got {names}")
@@ -199,10 +205,10 @@ def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:
     try:
         if job.batch:
             rows = gym.make_vec(job.env_id, len(scenarios), "vector_entry_point", **job.options)
-            endings = fly_worlds(rows, job.policy.make(env, job.seed), scenarios=scenarios)
+            endings = fly_worlds(rows, job.policy.make(env, job.seed), seed=job.weather_seeds, scenarios=scenarios)
             return list(map(record_of, job.keys, endings)), None
-        for key, scenario in zip(job.keys, scenarios, strict=True):
-            records.append(record_of(key, fly(env, job.policy.make(env, job.seed), scenario=scenario)))
+        for key, seed, scenario in zip(job.keys, job.weather_seeds, scenarios, strict=True):
+            records.append(record_of(key, fly(env, job.policy.make(env, job.seed), seed=seed, scenario=scenario)))
     except (Exception, SystemExit) as error:  # whatever a user's policy may raise
         return records, BrokenOff(job.keys[len(records)], told(error), traceback.format_exc())
     return records, None

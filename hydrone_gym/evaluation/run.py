@@ -44,7 +44,8 @@ def evaluate(
     Records are the same, times of decisions aside, whatever backend and number of jobs.
 
     Args:
-        suites: names of frozen suites, files or folders of your own (see `load_suite`), or `Suite` objects.
+        suites: names of frozen suites, "weather" for those of all levels, files or folders of your own (see
+            `load_suite`), or `Suite` objects.
         policies: registered names, "module:attribute", "file.py:attribute", folders of trained agents (see
             `find_policy`), or a mapping from labels to these or to factories, callables that take the environment.
         worlds: the first so many of each mission, None for all.
@@ -133,6 +134,8 @@ def _gather(results: Iterator[Any], records: list[Record], bar: tqdm, folder: Ru
             raise stopped(str(error)) from error
         records += finished
         bar.update(len(finished))
+        if finished:
+            bar.set_description(finished[-1].suite, refresh=False)
         if broken is not None:
             suite, mission, world, policy = broken.key
             failed = stopped(

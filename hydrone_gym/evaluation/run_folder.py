@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hydrone_gym._whole_file import whole
+from hydrone_gym.evaluation.levels import level_overview, level_tables
 from hydrone_gym.evaluation.plan import Plan
 from hydrone_gym.evaluation.provenance import made_with
 from hydrone_gym.evaluation.records import HEADER, Key, Record, parse_records, read_records, to_line
@@ -131,11 +132,11 @@ def write_results(
         "complete": len(records) == len(plan.keys()),
         "missions": [dataclasses.asdict(summary, dict_factory=_plain) for summary in summaries],
     }
-    tables = tables_of(summaries)
+    tables = [*level_tables(summaries), *tables_of(summaries)]
     _write_json(folder / SUMMARY, document)
     write_whole(folder / TABLES, markdown(tables))
     write_whole(folder / LATEX, latex(tables))
-    return document, overview(summaries)
+    return document, [*overview(summaries), *level_overview(summaries)]
 
 
 def _plain(fields: list[tuple[str, Any]]) -> dict[str, Any]:

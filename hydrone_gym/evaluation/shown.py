@@ -60,5 +60,5 @@ def fly_record(record: Record, plan: Plan) -> tuple[Flight, Simulation]:
     """Fly what a record tells of, alone; ValueError for one that is not in the plan, or a policy no longer made."""
     job = plan.job_of(record)
     env = job.make_env()
-    flight = fly(env, job.policy.make(env, job.seed), scenario=job.worlds[0][1])
+    flight = fly(env, job.policy.make(env, job.seed), seed=job.weather_seeds[0], scenario=job.worlds[0][1])
     return flight, env.get_wrapper_attr("simulation")

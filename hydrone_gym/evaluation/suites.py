@@ -5,7 +5,7 @@ import json
 import os
 import re
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym.weather.weather import LEVELS
 from hydrone_gym.world.scenario import Scenario, load_scenario
 
 FOLDER = Path(__file__).parent / "suite_data"
@@ -22,10 +23,13 @@ SHA256 = {
     "dense-40-v1": "7f6ce81f26cf1542651a6e6c86c0d491c85422224666cb9af810efe7c078289a",
     "missions-v1": "72fe7b6e597693931841108dfa61107687b3401fb704cacccc65670575a7acc9",
     "density-v1": "bb01d4f06de6be8501bb4fc11780bb3f9095c7656e5854dd7d5cd5c024b35238",
+    "weather-v1": "9648190c661d00b8bb370674cef3e166951be698c861cb904c9cdc5a18896b75",  # the worlds of every level
 }
 HELD_OUT = 10_000_000  # seeds from here on are for evaluation; training uses those below
 MISSIONS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
 _HELD_OUT = re.compile(r"held-out(?:-obstacles-(\d{1,3}))?(?:-radii-(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?))?")
+_WEATHER = re.compile(r"weather(-v\d+)?")
+_LEVEL = re.compile(rf"weather-([0-{len(LEVELS) - 1}])(-v\d+)?")
 _PARTS = ("start", "goal", "obstacles")
 
 
@@ -93,41 +97,69 @@ class Suite:
         return replace(self, missions=tuple(replace(m, scenarios=m.scenarios[:worlds]) for m in self.missions))
 
     def fingerprint(self) -> str:
-        """Return a hash of what is flown: missions, options and every number of every scenario."""
+        """Return a hash of what is flown: missions, options, every number of every scenario, and their weather."""
         digest = hashlib.sha256()
         for mission in self.missions:
-            digest.update(json.dumps([mission.name, mission.env_id, dict(mission.options)], sort_keys=True).encode())
+            described = [mission.name, mission.env_id, dict(mission.options)]
+            digest.update(json.dumps(described, sort_keys=True, default=repr).encode())
             for scenario in mission.scenarios:
                 digest.update(np.array([*scenario.start, *scenario.goal]).tobytes() + scenario.obstacles.tobytes())
+                digest.update(b"" if scenario.weather is None else repr(scenario.weather).encode())
         return digest.hexdigest()[:16]
 
 
 def frozen_suites() -> list[str]:
     """Return the names of the suites in the package, with their versions."""
-    return sorted(SHA256)
+    return sorted(name for frozen in SHA256 for name in _stands_for(frozen))
+
+
+def _stands_for(name: str) -> list[str]:
+    """Return the names of suites that a name stands for: itself, or those of all levels of weather."""
+    weather = _WEATHER.fullmatch(name)
+    return [f"weather-{level}{weather[1] or ''}" for level in range(len(LEVELS))] if weather else [name]
+
+
+def level_of(name: str) -> int | None:
+    """Return the level of weather that a frozen suite is flown at; None for any other suite."""
+    level = _LEVEL.fullmatch(name)
+    return int(level[1]) if level else None
+
+
+def in_short(names: Sequence[str]) -> list[str]:
+    """Return names of suites with those of all levels of weather in one, as it was asked for."""
+    short = list(names)
+    for frozen in filter(_WEATHER.fullmatch, SHA256):
+        if set(levels := _stands_for(frozen)) <= set(short):
+            short[short.index(levels[0])] = frozen
+            short = [name for name in short if name not in levels]
+    return short
+
+
+def load_suites(name_or_path: str | os.PathLike[str], worlds: int | None = None) -> list[Suite]:
+    """Return what `load_suite` does, or for "weather" its suites of all levels."""
+    return [load_suite(name, worlds) for name in _stands_for(os.fspath(name_or_path))]
 
 
 def load_suite(name_or_path: str | os.PathLike[str], worlds: int | None = None) -> Suite:
     """Return a frozen suite, worlds held out from training, or a suite of your own from a file or a folder.
 
     Args:
-        name_or_path: "paper-20" for its newest version, "paper-20-v1" for that one; "held-out", also with options of
-            its worlds as in "held-out-obstacles-40-radii-0.8-1.8"; the path of a file that `save_suite` wrote; or a
-            folder of scenario files, one mission, or of such folders, a mission each.
+        name_or_path: "paper-20" for its newest version, "paper-20-v1" for that one; "weather-0" to "weather-5";
+            "held-out", also with options of its worlds as in "held-out-obstacles-40-radii-0.8-1.8"; the path of a file
+            that `save_suite` wrote; or a folder of scenario files, one mission, or of such folders, a mission each.
         worlds: so many of each mission are drawn of those held out, 1,000 unless given.
 
     Raises:
         FileNotFoundError: none of these; the message lists the frozen suites.
-        ValueError: a damaged file, or a folder without scenarios.
+        ValueError: a damaged file, a folder without scenarios, or "weather", which stands for several suites.
     """
     name, path = os.fspath(name_or_path), Path(name_or_path)
-    if versions := [frozen for frozen in SHA256 if name in (frozen, frozen.rpartition("-v")[0])]:
-        newest = max(versions, key=lambda frozen: int(frozen.rpartition("-v")[2]))
-        path = FOLDER / f"{newest}.npz"
-        found = hashlib.sha256(path.read_bytes()).hexdigest()
-        if found != SHA256[newest]:
-            raise ValueError(f"{path}: the frozen suite is damaged, its SHA-256 is {found}, not {SHA256[newest]}")
-        return _read(path)
+    if len(levels := _stands_for(name)) > 1:
+        raise ValueError(f"{name} stands for {len(levels)} suites, {levels[0]} to {levels[-1]}: give one of them")
+    level = _LEVEL.fullmatch(name)
+    if versions := _versions(f"weather{level[2] or ''}" if level else name):
+        suite = _read_frozen(max(versions, key=lambda frozen: int(frozen.rpartition("-v")[2])))
+        return _at_level(suite, int(level[1])) if level else suite
     if held_out := _HELD_OUT.fullmatch(name):
         count, low, high = held_out.groups()
         options: dict[str, Any] = {} if count is None else {"num_obstacles": int(count)}
@@ -137,6 +169,25 @@ def load_suite(name_or_path: str | os.PathLike[str], worlds: int | None = None) 
         frozen = ", ".join(frozen_suites())
         raise FileNotFoundError(f"no suite {name!r}: frozen are {frozen}; or give held-out, a file or a folder")
     return _from_folder(path) if path.is_dir() else _read(path)
+
+
+def _versions(name: str) -> list[str]:
+    return [frozen for frozen in SHA256 if name in (frozen, frozen.rpartition("-v")[0])]
+
+
+def _read_frozen(name: str) -> Suite:
+    """Read a file of the package, which must be what it was."""
+    path = FOLDER / f"{name}.npz"
+    found = hashlib.sha256(path.read_bytes()).hexdigest()
+    if found != SHA256[name]:
+        raise ValueError(f"{path}: the frozen suite is damaged, its SHA-256 is {found}, not {SHA256[name]}")
+    return _read(path)
+
+
+def _at_level(suite: Suite, level: int) -> Suite:
+    """Return the suite of a level: the worlds of all levels in its weather."""
+    missions = tuple(replace(m, options={**m.options, "weather": level}) for m in suite.missions)
+    return replace(suite, name=suite.name.replace("weather", f"weather-{level}"), missions=missions)
 
 
 def _from_folder(folder: Path) -> Suite:
@@ -156,12 +207,15 @@ def _from_folder(folder: Path) -> Suite:
 def save_suite(suite: Suite, path: str | os.PathLike[str]) -> None:
     """Write a suite to an NPZ file that `load_suite` reads; every float is restored bit for bit, nothing is pickled.
 
-    Raises ValueError where scenarios of one mission have different numbers of spheres, OSError if writing fails.
+    Raises ValueError where scenarios of one mission have different numbers of spheres, or weather of their own, and
+    OSError if writing fails.
     """
     arrays: dict[str, NDArray] = {}
     for mission in suite.missions:
         if len({len(scenario.obstacles) for scenario in mission.scenarios}) > 1:
             raise ValueError(f"scenarios of mission {mission.name!r} must have equally many spheres to be saved")
+        if any(scenario.weather is not None for scenario in mission.scenarios):
+            raise ValueError(f"scenarios of mission {mission.name!r} must leave weather to its options to be saved")
         for part in _PARTS:
             arrays[f"{mission.name}/{part}"] = np.array([getattr(scenario, part) for scenario in mission.scenarios])
     described = [{"name": m.name, "env_id": m.env_id, "options": dict(m.options)} for m in suite.missions]

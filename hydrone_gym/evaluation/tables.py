@@ -13,7 +13,7 @@ from hydrone_gym.rendering.comparison import shortened
 
 _WIDTH = 120  # characters that every table fits in; an overview fits in 80
 _NAME = 22  # characters of a policy in an overview
-_NONE = "–"
+NONE = "–"
 _MIDDLE = "interquartile mean (of the middle half) with its 95 % bootstrap interval"
 
 
@@ -65,27 +65,27 @@ def _table(where: str, baseline: str, kind: _Kind, entries: Sequence[PolicySumma
 
 def _outcome(p: PolicySummary) -> tuple[str, ...]:
     counts = map(str, (p.collisions, p.rough_crossings, p.timeouts, p.out_of_bounds + p.diverged))
-    others = _cell(p.clearance, 2), _cell(p.interventions, 1)
-    return (f"{p.rank}. {p.policy}", str(p.worlds), _cell(p.success, 1, 100.0), *counts, *others)
+    others = cell(p.clearance, 2), cell(p.interventions, 1)
+    return (f"{p.rank}. {p.policy}", str(p.worlds), cell(p.success, 1, 100.0), *counts, *others)
 
 
 def _crossing(p: PolicySummary) -> tuple[str, ...]:
-    speeds = _cell(p.lateral_speed, 3), _cell(p.lateral_speed_max, 3)
-    tilts = _cell(p.tilt, 2, math.degrees(1.0)), _cell(p.tilt_max, 2, math.degrees(1.0))
-    return (p.policy, str(p.crossed), _cell(p.rough, 1, 100.0), *speeds, *tilts)
+    speeds = cell(p.lateral_speed, 3), cell(p.lateral_speed_max, 3)
+    tilts = cell(p.tilt, 2, math.degrees(1.0)), cell(p.tilt_max, 2, math.degrees(1.0))
+    return (p.policy, str(p.crossed), cell(p.rough, 1, 100.0), *speeds, *tilts)
 
 
 def _measures(p: PolicySummary) -> tuple[str, ...]:
-    return (p.policy, _cell(p.time, 2), _cell(p.length, 1), _cell(p.energy, 0))
+    return (p.policy, cell(p.time, 2), cell(p.length, 1), cell(p.energy, 0))
 
 
 def _decision(p: PolicySummary) -> tuple[str, ...]:
-    return (p.policy, _cell(p.decision_ms_p50, 2), _cell(p.decision_ms_p99, 2))
+    return (p.policy, cell(p.decision_ms_p50, 2), cell(p.decision_ms_p99, 2))
 
 
 def _difference(c: Comparison) -> tuple[str, ...]:
     worlds = (f"{c.only_policy} / {c.only_baseline}", f"{c.p_value:.2g}", str(c.both))
-    success, time, energy = _cell(c.success, 1, 100.0, "+"), _cell(c.time, 2, 1.0, "+"), _cell(c.energy, 0, 1.0, "+")
+    success, time, energy = cell(c.success, 1, 100.0, "+"), cell(c.time, 2, 1.0, "+"), cell(c.energy, 0, 1.0, "+")
     return (c.policy, success, *worlds, time, energy)
 
 
@@ -94,13 +94,13 @@ def _brief(p: PolicySummary) -> tuple[str, ...]:
     counts = map(str, (p.collisions, p.rough_crossings, others))
     time = None if p.time is None else p.time.value
     name = shortened(p.policy, _NAME)
-    return (name, _cell(p.success, 1, 100.0), *counts, _cell(time, 1), _cell(p.decision_ms_p99, 2))
+    return (name, cell(p.success, 1, 100.0), *counts, cell(time, 1), cell(p.decision_ms_p99, 2))
 
 
-def _cell(value: Estimate | float | None, digits: int, scale: float = 1.0, sign: str = "") -> str:
+def cell(value: Estimate | float | None, digits: int, scale: float = 1.0, sign: str = "") -> str:
     """Return a value, with its interval if it has one; `sign` "+" shows the sign of positive numbers."""
     if value is None:
-        return _NONE
+        return NONE
     numbers = value if isinstance(value, Estimate) else (value,)
     written = (f"{scale * number:{sign}z.{digits}f}" for number in numbers if number is not None)
     shown, *ends = [number.replace("-", "−") for number in written]
@@ -118,7 +118,7 @@ _OUTCOMES = _Kind(
         "Success: share of the flights that arrived, with its 95 % Wilson interval.",
         "Other: flights that left the box or diverged.",
         "Least clearance: of all flights, between the vehicle's sphere and an obstacle; below zero they overlap.",
-        f"Interventions: periods in which the shield flew another reference, mean a flight; {_NONE} without a shield.",
+        f"Interventions: periods in which the shield flew another reference, mean a flight; {NONE} without a shield.",
     ),
 )
 _CROSSINGS = _Kind(

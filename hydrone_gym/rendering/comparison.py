@@ -1,4 +1,4 @@
-"""Figures that compare policies: success, distributions, success against density, times of decisions.
+"""Figures that compare policies: success, distributions, success against density or weather, times of decisions.
 
 Every figure is one small panel, wide enough for a phone, and has all policies as rows in the same order and colours;
 a policy without values keeps its row. Functions take plain arrays and return Matplotlib figures;
@@ -25,6 +25,7 @@ COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.WATER, sty
 _MARKERS = "osD^vP*X"
 _WIDTH = 4.8  # inches of a panel
 _ROW = 0.37  # inches a policy takes
+_LINE = 0.2  # inches a line of ticks takes
 _EDGE = "#333333"
 _RIM: dict[str, Any] = {"markeredgecolor": _EDGE, "markeredgewidth": 0.5}
 _MUTED = "#5a6570"
@@ -71,15 +72,24 @@ def plot_distributions(
     return figure
 
 
-def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title: str = "") -> Figure:
-    """Draw success against the number of obstacles: K counts, ascending.
+def plot_rates(
+    counts: Sequence[int],
+    rates: Mapping[str, ArrayLike],
+    label: str,
+    *,
+    ticks: Sequence[str] = (),
+    whole: bool = False,
+    title: str = "",
+) -> Figure:
+    """Draw success against a number, such as that of obstacles: K counts, ascending.
 
     Each policy has rates (K, 3), else ValueError: the share that arrived and both ends of its interval, from 0 to 1;
-    NaN where it did not fly.
+    NaN where it did not fly. `label` is of the axis, `ticks` stand on it instead of the counts, of equally many lines
+    each; with `whole` the shares are shown from 0 to 1.
     """
     gap = float(np.diff(counts).min()) if len(counts) > 1 else 1.0
     step = 0.6 * gap / max(len(rates), 1)  # side by side, so that no interval hides another
-    with _drawing(4.9, title) as (figure, axes):
+    with _drawing(4.9 + _LINE * "".join(ticks[:1]).count("\n"), title) as (figure, axes):
         for index, (policy, entry) in enumerate(rates.items()):
             shares = 100.0 * np.asarray(entry, dtype=np.float64)
             if shares.shape != (len(counts), 3):
@@ -89,8 +99,9 @@ def plot_density(counts: Sequence[int], rates: Mapping[str, ArrayLike], *, title
             look |= {"linestyle": "-" if index < len(COLOURS) else "--", "linewidth": 1.6, "elinewidth": 1.2}
             reach = np.clip([shares[:, 0] - shares[:, 1], shares[:, 2] - shares[:, 0]], 0.0, None)
             axes.errorbar(places, shares[:, 0], yerr=reach, markersize=6.5, label=shortened(policy, _LABEL), **look)
-        axes.set_ylim(top=102.0)
-        axes.set(xticks=counts, xlabel="number of obstacles", ylabel="flights that arrived (%)")
+        axes.set_ylim(-2.0 if whole else None, 102.0)
+        axes.set_xticks(counts, ticks or None)
+        axes.set(xlabel=label, ylabel="flights that arrived (%)")
         axes.grid(color="#e6e6e6", linewidth=0.6)
         figure.legend(loc="outside lower center", ncols=2, frameon=False, handlelength=1.6, columnspacing=1.2)
     return figure

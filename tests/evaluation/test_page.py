@@ -199,13 +199,11 @@ def test_every_figure_is_a_file_for_a_paper(folder, page, tmp_path):
 
 def test_success_against_density_counts_every_flight_once(monkeypatch):
     drawn = []
-    plot = page_figures.plot_density
-    monkeypatch.setattr(
-        page_figures, "plot_density", lambda *args, **kwargs: drawn.append(args) or plot(*args, **kwargs)
-    )
+    plot = page_figures.plot_rates
+    monkeypatch.setattr(page_figures, "plot_rates", lambda *args, **kwargs: drawn.append(args) or plot(*args, **kwargs))
     records = list(made_records(made_plan()))
     page_figures.charts_of(records, summarise(records, "good"))
-    ((counts, rates),) = drawn
+    ((counts, rates, _),) = drawn
     assert counts == [5, 30]
     np.testing.assert_allclose(rates["good"], [(1.0, *wilson_interval(WORLDS, WORLDS))] * 2)
 

@@ -10,22 +10,28 @@ import pytest
 
 from benchmarks.freeze_suites import IDS, RECIPES, draw
 from hydrone_gym.envs.hydrone_env import known_options
-from hydrone_gym.evaluation import HELD_OUT, Mission, Suite, frozen_suites, load_suite, save_suite
-from hydrone_gym.evaluation.suites import FOLDER, SHA256
+from hydrone_gym.evaluation import HELD_OUT, MISSIONS, Mission, Suite, frozen_suites, load_suite, save_suite
+from hydrone_gym.evaluation.suites import FOLDER, SHA256, in_short, level_of, load_suites
+from hydrone_gym.weather import Weather
 from hydrone_gym.world.scenario import Scenario, save_scenario
 
+LEVELS = [f"weather-{level}-v1" for level in range(6)]
 HERE = Scenario(start=(-8.0, 0.0, 5.0, 0.3), goal=(8.0, 0.0, 5.0), obstacles=[(0.0, 0.0, 5.0, 1.0)])
 
 
 @pytest.mark.parametrize("name", sorted(RECIPES))
 def test_drawing_a_frozen_suite_again_gives_its_arrays(name):
-    frozen = load_suite(name)
-    assert frozen == draw(name)
+    suites, drawn = load_suites(name), draw(name)
+    assert [suite.name for suite in suites] == (LEVELS if name == "weather-v1" else [name])
+    for suite in suites:
+        for frozen, again in zip(suite.missions, drawn.missions, strict=True):
+            options = {key: value for key, value in frozen.options.items() if key != "weather"}
+            assert replace(frozen, options=options) == again
     assert hashlib.sha256((FOLDER / f"{name}.npz").read_bytes()).hexdigest() == SHA256[name]
 
 
 def test_frozen_suites_hold_what_they_promise():
-    assert frozen_suites() == sorted(RECIPES)
+    assert frozen_suites() == sorted({*RECIPES, *LEVELS} - {"weather-v1"})
     counts = {}
     for name in frozen_suites():
         for mission in load_suite(name).missions:
@@ -47,6 +53,7 @@ def test_frozen_suites_hold_what_they_promise():
         **{("dense-40-v1", mission): (200, {40}) for mission in both},
         **{("missions-v1", mission): (100, {20}) for mission in media},
         **{("density-v1", f"{mission}-{n}"): (50, {n}) for mission in both for n in (0, 10, 20, 30, 40)},
+        **{(level, mission): (200, {20}) for level in LEVELS for mission in (*both, "random")},
     }
 
 
@@ -57,11 +64,35 @@ def test_missions_join_the_media_they_are_named_for():
             assert np.linalg.norm(np.array(scenario.start[:3]) - scenario.goal) >= 8.0
 
 
-@pytest.mark.parametrize("mission", sorted(IDS))
-def test_a_frozen_world_is_the_one_its_environment_draws(mission):
-    suite = load_suite("paper-20")
+def test_a_level_is_the_same_worlds_in_its_weather():
+    still, *others = load_suites("weather")
+    for level, suite in enumerate([still, *others]):
+        assert (suite.name, level_of(suite.name)) == (LEVELS[level], level)
+        assert {mission.options["weather"] for mission in suite.missions} == {level}
+        assert [m.scenarios for m in suite.missions] == [m.scenarios for m in still.missions]
+    assert [mission.env_id for mission in still.missions] == [MISSIONS[1], MISSIONS[2], MISSIONS[0]]
+    assert load_suite("weather-3") == load_suite("weather-3-v1") == others[2]
+    assert len({suite.fingerprint() for suite in (still, *others)}) == 6
+    assert level_of("paper-20-v1") is level_of("weather-6") is level_of("weather-v1") is None
+    for name in ("weather", "weather-v1"):
+        with pytest.raises(
+            ValueError, match=f"{name} stands for 6 suites, .* to weather-5.*: give one"
+        ):
+            load_suite(name)
+
+
+def test_all_levels_have_one_name_in_short():
+    assert in_short(["paper-20-v1", *LEVELS, "mine"]) == ["paper-20-v1", "weather-v1", "mine"]
+    assert in_short(LEVELS[1:]) == LEVELS[1:]
+
+
+@pytest.mark.parametrize(
+    ("name", "mission"), [*(("paper-20", mission) for mission in sorted(IDS)), ("weather-5", "random")]
+)
+def test_a_frozen_world_is_the_one_its_environment_draws(name, mission):
+    suite = load_suite(name)
     (found,) = [entry for entry in suite.missions if entry.name == mission]
-    recipe = RECIPES[suite.name]
+    recipe = RECIPES[suite.name.replace("weather-5", "weather")]
     env = gym.make(found.env_id, **found.options)
     for world in (0, 7, 199):
         env.reset(seed=recipe.seed + world)
@@ -135,8 +166,11 @@ def test_the_fingerprint_tells_suites_apart():
         suite(replace(HERE, goal=(8.0, 0.0, 5.5))),
         suite(replace(HERE, obstacles=nudged)),
         suite(replace(HERE, start=(-8.0, 0.0, 5.0, 0.4))),
+        suite(replace(HERE, weather=Weather(wind=1.0))),
+        suite(options={"weather": Weather(wind=1.0)}),
+        suite(options={"weather": Weather(wind=2.0)}),
     ]
-    assert len({suite().fingerprint(), *(other.fingerprint() for other in others)}) == 7
+    assert len({suite().fingerprint(), *(other.fingerprint() for other in others)}) == 10
     assert suite().fingerprint() == suite().fingerprint()
 
 
@@ -162,6 +196,9 @@ def test_what_is_no_suite_is_refused(tmp_path):
     uneven = replace(mission, scenarios=(HERE, replace(HERE, obstacles=[])))
     with pytest.raises(ValueError, match="equally many spheres"):
         save_suite(Suite(name="s", missions=(uneven,)), tmp_path / "uneven.npz")
+    windy = replace(mission, scenarios=(replace(HERE, weather=Weather(wind=1.0)),))
+    with pytest.raises(ValueError, match="must leave weather to its options to be saved"):
+        save_suite(Suite(name="s", missions=(windy,)), tmp_path / "windy.npz")
     for name in ("vehicle", "interface", "render_mode"):
         assert name in known_options()
         with pytest.raises(ValueError, match=f"must leave option {name} to the evaluation"):

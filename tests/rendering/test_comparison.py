@@ -12,8 +12,8 @@ from hydrone_gym.rendering.comparison import (
     COLOURS,
     colour,
     plot_decisions,
-    plot_density,
     plot_distributions,
+    plot_rates,
     plot_success,
     shortened,
 )
@@ -74,7 +74,8 @@ def test_boxes_span_quartiles_and_whiskers_leave_a_tenth():
 
 
 def test_density_joins_rates_and_leaves_gaps():
-    figure = plot_density([0, 20], {"a": [(1.0, 0.8, 1.0), (0.5, 0.3, 0.7)], "b": [(np.nan,) * 3, (0.9, 0.8, 1.0)]})
+    rates = {"a": [(1.0, 0.8, 1.0), (0.5, 0.3, 0.7)], "b": [(np.nan,) * 3, (0.9, 0.8, 1.0)]}
+    figure = plot_rates([0, 20], rates, "spheres")
     (axes,) = figure.axes
     first, second = (bar.lines[0].get_data() for bar in axes.containers)
     assert first[1].tolist() == [100.0, 50.0]
@@ -84,7 +85,7 @@ def test_density_joins_rates_and_leaves_gaps():
     ends = axes.containers[0].lines[2][0].get_segments()
     np.testing.assert_allclose([end[:, 1] for end in ends], [[80.0, 100.0], [30.0, 70.0]])
     with pytest.raises(ValueError, match=r"rates of a must have shape \(2, 3\), got \(1, 3\)"):
-        plot_density([0, 20], {"a": [(1.0, 1.0, 1.0)]})
+        plot_rates([0, 20], {"a": [(1.0, 1.0, 1.0)]}, "spheres")
 
 
 def test_decisions_are_on_a_logarithmic_axis():
