@@ -73,7 +73,8 @@ class Flight(Ending):
 def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scenario | None = None) -> Flight:
     """Fly one episode of a HyDrone environment with `interface="world"`, wrapped or not, and return its record.
 
-    The policy's memory is new; the environment draws what is flown unless a `scenario` is given.
+    The policy's memory is new; the environment draws what is flown from the `seed` unless a `scenario` is given, and
+    weather and vehicle, where they are drawn, also then.
 
     Raises TypeError for an environment of another kind, ValueError for another interface, or a scenario not for it.
     """
@@ -114,21 +115,27 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
 
 
 def fly_worlds(
-    env: gym.vector.VectorEnv, policy: Policy, *, seed: int | None = None, scenarios: Sequence[Scenario] | None = None
+    env: gym.vector.VectorEnv,
+    policy: Policy,
+    *,
+    seed: int | Sequence[int] | None = None,
+    scenarios: Sequence[Scenario] | None = None,
 ) -> list[Ending]:
     """Fly a policy once in each row of a vector of environments, deterministically, all at once.
 
     Args:
         env: from `gym.make_vec(id, n, vectorization_mode="vector_entry_point")`, `interface="world"`.
         policy: chooses the references of all rows that still fly; its memory is new.
-        seed: row i flies the world that a single environment draws from ``seed + i``.
-        scenarios: what to fly, one a row, None for drawn worlds.
+        seed: row i flies the world, weather and vehicle that a single environment draws from ``seed + i``, or from
+            entry i of several.
+        scenarios: the worlds to fly, one a row, None for drawn ones.
 
     Returns how the first episode of each row ended: as alone, if the policy chooses in a batch what it chooses alone.
     """
     if env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) != AutoresetMode.NEXT_STEP:
         raise ValueError(f"fly_worlds needs autoreset_mode NextStep, got {env.metadata['autoreset_mode']}")
-    observation, _ = env.reset(seed=seed, options=None if scenarios is None else {"scenario": list(scenarios)})
+    chosen: Any = {"seed": seed, "options": None if scenarios is None else {"scenario": list(scenarios)}}
+    observation, _ = env.reset(**chosen)
     running, memory, starts = np.arange(env.num_envs), None, np.ones(env.num_envs, bool)
     returns, shares, endings = np.zeros(env.num_envs), [], {}
     while len(running):

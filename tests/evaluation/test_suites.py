@@ -75,9 +75,7 @@ def test_a_level_is_the_same_worlds_in_its_weather():
     assert len({suite.fingerprint() for suite in (still, *others)}) == 6
     assert level_of("paper-20-v1") is level_of("weather-6") is level_of("weather-v1") is None
     for name in ("weather", "weather-v1"):
-        with pytest.raises(
-            ValueError, match=f"{name} stands for 6 suites, .* to weather-5.*: give one"
-        ):
+        with pytest.raises(ValueError, match=f"{name} stands for 6 suites, .* to weather-5.*: give one"):
             load_suite(name)
 
 
