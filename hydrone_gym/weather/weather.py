@@ -149,18 +149,22 @@ class Weather:
 
 
 def _level(level: int, wind: float, current: float, height: float, period: float, error: float) -> Weather:
-    """Return a level: `error` is that of mass and thrust; what nobody measures well, drag, is worse known."""
-    drag = 0.1 * level
+    """Return a level; `error` is that of mass and thrust, which a scale and a hover tell.
+
+    Inertia comes from a drawing and drag from a guess: MarineGym trains with inertia within 20 % and drag down to half,
+    which are the errors of level 5.
+    """
+    drag, steps = 0.1 * level, level - 1
     spread = Spread(
         mass=error,
         thrust=error,
         inertia=0.04 * level,
         drag=drag,
-        # of small to large propellers in air (RotorPy 5-72 ms, Aerial Gym 25-80), up to a T200-like thruster in water
-        rotor_lag_air=(0.005 * level, 0.01 * level),
-        rotor_lag_water=(0.007 * level, 0.02 * level),
+        # propellers from small to large: 5-72 ms in RotorPy, 25-80 in Aerial Gym; the vehicle's authors take 33
+        rotor_lag_air=(0.005 + 0.00375 * steps, 0.015 + 0.00875 * steps),
+        rotor_lag_water=(level / 150.0, level / 50.0),  # up to the authors' 33 ms and the 100 of a T200-like thruster
         rotor_drag=(ROTOR_DRAG * (1.0 - drag), ROTOR_DRAG * (1.0 + drag)),
-        height=(0.135, 0.2),  # as in the simulator of the vehicle's authors
+        height=(0.135, 0.2),  # over which density changes in the authors' simulator
     )
     name = f"level {level}"
     return Weather(wind=wind, current=current, wave_height=height, wave_period=period, spread=spread, name=name)
