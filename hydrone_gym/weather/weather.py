@@ -4,6 +4,7 @@ A level is a wind with the sea that belongs to it, and a vehicle that is farther
 """
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,14 +16,14 @@ DEPTH = 5.0  # m, of the default world's water: what the steepness of a wave is 
 ROTOR_DRAG = 1.19e-4  # N s/(m rad/s) a rotor: RotorPy's Hummingbird
 Range = tuple[float, float]
 
-# Rule of each number: unit, least and greatest value, and why there is an upper bound.
+# Rule of each number: unit, least and greatest value, and why it ends there.
 _NUMBERS = {
-    "wind": ("m/s", 0.0, 20.0, "no tilt that the rotors allow holds the vehicle in more"),
-    "turbulence": ("1", 0.0, 3.0, "gusts would blow against the mean wind most of the time"),
+    "wind": ("m/s", 0.0, 20.0, "a gale; the law's greatest tilt holds the vehicle in 12"),
+    "turbulence": ("1", 0.0, 3.0, "beyond, gusts are as strong as the wind itself"),
     "current": ("m/s", 0.0, 2.0, "the vehicle swims at 1.2 m/s at most"),
-    "current_variation": ("1", 0.0, 1.0, "the current would mostly not be what its mean says"),
+    "current_variation": ("1", 0.0, 1.0, "beyond, eddies are stronger than the current itself"),
     "wave_height": ("m", 0.0, 3.0, "the water is 5 m deep"),
-    "wave_period": ("s", 0.3, 20.0, "beyond it is a tide"),
+    "wave_period": ("s", 0.3, 20.0, "a shorter wave is a ripple, a longer one a tide"),
 }
 _DIRECTIONS = ("wind_direction", "current_direction", "wave_direction")
 _RANGES = {"rotor_lag_air": ("s", 1.0), "rotor_lag_water": ("s", 1.0), "rotor_drag": ("N s/(m rad/s)", 1e-2)}
@@ -30,7 +31,8 @@ SEAS = ("regular", "jonswap")
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    # Comparing, unlike math.isfinite, also copes with an integer too large for a float.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,8 +118,11 @@ class Weather:
             object.__setattr__(self, name, float(value))
         for name in _DIRECTIONS:
             value = getattr(self, name)
-            if value is not None and not _is_number(value):
+            if value is None:
+                continue
+            if not _is_number(value):
                 raise ValueError(f"Weather.{name} must be a finite number (rad) or None, got {value!r}")
+            object.__setattr__(self, name, float(value))
         if not isinstance(self.shear, bool):
             raise ValueError(f"Weather.shear must be True or False, got {self.shear!r}")
         if self.sea not in SEAS:
@@ -129,11 +134,11 @@ class Weather:
         if not isinstance(self.name, str):
             raise ValueError(f"Weather.name must be a string, got {self.name!r}")
         k = wave_number(2.0 * math.pi / self.wave_period, DEPTH)
-        highest = STEEPEST * 2.0 * math.pi / k * math.tanh(k * DEPTH)
-        if self.wave_height > highest:
+        length, share = 2.0 * math.pi / k, STEEPEST * math.tanh(k * DEPTH)  # Miche 1944
+        if self.wave_height > share * length:
             raise ValueError(
-                f"Weather.wave_height must be at most {highest:.3g} m for a period of {self.wave_period:g} s: a wave "
-                f"{2.0 * math.pi / k:.3g} m long breaks beyond {STEEPEST} of its length, got {self.wave_height!r} m"
+                f"Weather.wave_height must be at most {share * length:.3g} m for a period of {self.wave_period:g} s: a "
+                f"wave {length:.3g} m long breaks beyond {share:.3g} of its length, got {self.wave_height!r} m"
             )
 
     @property
@@ -144,18 +149,22 @@ class Weather:
 
 
 def _level(level: int, wind: float, current: float, height: float, period: float, error: float) -> Weather:
-    """Return a level: `error` is that of mass and thrust; what nobody measures well, drag, is worse known."""
-    drag = 0.1 * level
+    """Return a level; `error` is that of mass and thrust, which a scale and a hover tell.
+
+    Inertia comes from a drawing and drag from a guess: MarineGym trains with inertia within 20 % and drag down to half,
+    which are the errors of level 5.
+    """
+    drag, steps = 0.1 * level, level - 1
     spread = Spread(
         mass=error,
         thrust=error,
         inertia=0.04 * level,
         drag=drag,
-        # of small to large propellers in air (RotorPy 5-72 ms, Aerial Gym 25-80), up to a T200-like thruster in water
-        rotor_lag_air=(0.005 * level, 0.01 * level),
-        rotor_lag_water=(0.007 * level, 0.02 * level),
+        # propellers from small to large: 5-72 ms in RotorPy, 25-80 in Aerial Gym; the vehicle's authors take 33
+        rotor_lag_air=(0.005 + 0.00375 * steps, 0.015 + 0.00875 * steps),
+        rotor_lag_water=(level / 150.0, level / 50.0),  # up to the authors' 33 ms and the 100 of a T200-like thruster
         rotor_drag=(ROTOR_DRAG * (1.0 - drag), ROTOR_DRAG * (1.0 + drag)),
-        height=(0.135, 0.2),  # as in the simulator of the vehicle's authors
+        height=(0.135, 0.2),  # over which density changes in the authors' simulator
     )
     name = f"level {level}"
     return Weather(wind=wind, current=current, wave_height=height, wave_period=period, spread=spread, name=name)
@@ -172,14 +181,15 @@ LEVELS = (
 
 
 def named_weather(value: Any) -> Weather:
-    """Return the weather of a level (0 to 5), or the weather itself.
+    """Return the weather of a level (0 to 5, or "0" to "5" as a command line has it), or the weather itself.
 
-    Raises ValueError for another number and TypeError for anything else.
+    Raises ValueError for another number or text and TypeError for anything else.
     """
     if isinstance(value, Weather):
         return value
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, int | str):
         raise TypeError(f"weather must be a level from 0 to {len(LEVELS) - 1} or a hydrone_gym.Weather, got {value!r}")
-    if not 0 <= value < len(LEVELS):
+    levels = {key: weather for level, weather in enumerate(LEVELS) for key in (level, str(level))}
+    if value not in levels:
         raise ValueError(f"weather must be a level from 0 to {len(LEVELS) - 1} or a Weather, got {value!r}")
-    return LEVELS[value]
+    return levels[value]

@@ -14,6 +14,7 @@ from hydrone_gym.world.world import World
 
 FORMAT = "hydrone_gym scenario"
 VERSION = 1
+WEATHER_VERSION = 2  # of a file that carries weather, so that no reader of version 1 flies it without
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,7 +70,7 @@ class Scenario:
         )
 
     def __hash__(self) -> int:
-        return hash((self.start, self.goal, self.name, len(self.obstacles)))
+        return hash((self.start, self.goal, self.name, self.weather, len(self.obstacles)))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore after pickling or copying, which forget that the array is read-only."""
@@ -127,7 +128,7 @@ def save_scenario(scenario: Scenario, path: str | Path) -> None:
     if scenario.weather is not None:
         if scenario.weather.extra is not None:
             raise ValueError(f"{path}: a scenario file cannot hold the disturbance {scenario.weather.extra!r}")
-        content["weather"] = asdict(scenario.weather)
+        content |= {"version": WEATHER_VERSION, "weather": asdict(scenario.weather)}
     try:
         text = json.dumps(content, indent=1, allow_nan=False)
     except ValueError:
@@ -154,10 +155,10 @@ def _parse(text: str) -> Scenario:
         raise ValueError(f"not complete JSON: {error}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ValueError(f'not a scenario file: "format" must be "{FORMAT}"')
-    if content.get("version") != VERSION:
-        raise ValueError(f'"version" must be {VERSION}, got {content.get("version")!r}')
+    if content.get("version") not in (VERSION, WEATHER_VERSION):
+        raise ValueError(f'"version" must be {VERSION} or {WEATHER_VERSION}, got {content.get("version")!r}')
     known = {"format", "version", *(spec.name for spec in fields(Scenario))}
-    if "weather" not in content:  # most scenarios leave it to the environment
+    if content["version"] == VERSION:  # it leaves weather to the environment
         known.remove("weather")
     for problem, keys in (("missing", known - content.keys()), ("unknown", content.keys() - known)):
         if keys:
@@ -180,7 +181,7 @@ def _weather_of(content: Any) -> Weather:
     """Rebuild a weather from what `dataclasses.asdict` made of it; ValueError says what is wrong."""
     if not isinstance(content, dict) or not isinstance(content.get("spread"), dict):
         raise ValueError(f'"weather" must be an object with a "spread", got {content!r}')
-    try:
-        return Weather(**{**content, "spread": Spread(**content["spread"])})
-    except TypeError as error:
-        raise ValueError(f"weather: {error}") from None
+    for kind, entries in ((Weather, content), (Spread, content["spread"])):
+        if unknown := entries.keys() - {spec.name for spec in fields(kind)}:
+            raise ValueError(f"weather: unknown key {', '.join(map(repr, sorted(unknown)))}")
+    return Weather(**{**content, "spread": Spread(**content["spread"])})
