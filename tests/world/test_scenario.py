@@ -4,6 +4,7 @@ import copy
 import json
 import math
 import pickle
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hydrone_gym.weather import Spread, Weather
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario, validate
 from hydrone_gym.world.world import World
 
@@ -18,6 +20,9 @@ RADIUS = 0.45
 START = (-9.0, -9.0, 8.0, 0.25)
 GOAL = (9.0, 9.0, -3.0)
 SPHERES = ((0.0, 0.0, 1.0, 1.5), (1.0, 2.0, -3.0, 0.5))
+SQUALL = Weather(
+    wind=1.0 / 3.0, wave_direction=-0.1, shear=True, sea="jonswap", spread=Spread(drag=0.1, height=(0.1, 0.2))
+)
 
 
 def scenario(**changes):
@@ -55,6 +60,7 @@ def test_obstacles_are_an_own_read_only_array():
         {"obstacles": SPHERES[:1]},
         {"obstacles": (SPHERES[0], (1.0, 2.0, -3.0, 0.6))},
         {"name": "other"},
+        {"weather": SQUALL},
     ],
 )
 def test_scenarios_are_equal_by_value(changes):
@@ -79,6 +85,7 @@ def test_copies_are_equal_and_still_read_only(duplicate):
         ({"obstacles": np.zeros((2, 3))}, r"Scenario.obstacles must have shape \(M, 4\) \(m\), got \(2, 3\)"),
         ({"obstacles": [[1, 2, 3, 4], [1, 2]]}, r"Scenario.obstacles must hold four numbers \(m\) a row"),
         ({"name": 3}, "Scenario.name must be a string, got 3"),
+        ({"weather": 3}, "Scenario.weather must be a Weather or None, got 3"),
     ],
 )
 def test_wrong_shapes_are_refused(changes, message):
@@ -160,6 +167,44 @@ def test_file_says_what_it_is(tmp_path):
     assert content["start"] == list(START)
 
 
+def test_weather_is_part_of_the_value():
+    made = scenario(weather=SQUALL)
+    assert made == scenario(weather=replace(SQUALL)) != scenario(weather=replace(SQUALL, wind=0.5)) != scenario()
+    assert len({hash(made), hash(scenario()), hash(scenario(weather=Weather()))}) == 3
+    assert repr(SQUALL) in repr(made)
+    assert pickle.loads(pickle.dumps(made)) == made
+
+
+def test_files_carry_weather_only_when_it_is_given(tmp_path):
+    """A file with weather is of version 2: a reader of version 1 refuses it, instead of flying in still air."""
+    path = tmp_path / "scenario.json"
+    save_scenario(scenario(), path)
+    assert "weather" not in json.loads(path.read_text())
+    assert load_scenario(path).weather is None
+    for weather in (SQUALL, Weather()):
+        save_scenario(scenario(weather=weather), path)
+        assert json.loads(path.read_text())["version"] == 2
+        assert repr(load_scenario(path)) == repr(scenario(weather=weather))
+
+
+def test_files_from_before_there_was_weather_are_read(tmp_path):
+    path = tmp_path / "old.json"
+    path.write_text(
+        '{"format": "hydrone_gym scenario", "version": 1, "start": [-9.0, -9.0, 8.0, 0.25], "goal": [9.0, 9.0, -3.0],'
+        ' "obstacles": [[0.0, 0.0, 1.0, 1.5], [1.0, 2.0, -3.0, 0.5]], "name": "two"}'
+    )
+    assert load_scenario(path) == scenario()
+
+
+def test_weather_in_a_file_may_leave_out_what_is_as_usual(tmp_path):
+    path = tmp_path / "breeze.json"
+    save_scenario(scenario(weather=Weather(wind=2.0)), path)
+    content = json.loads(path.read_text())
+    content["weather"] = {"wind": 2, "spread": {}}
+    path.write_text(json.dumps(content))
+    assert load_scenario(path) == scenario(weather=Weather(wind=2.0))
+
+
 def test_unsavable_numbers_are_refused_without_a_file(tmp_path):
     path = tmp_path / "scenario.json"
     with pytest.raises(ValueError, match=r"scenario.json: a scenario with numbers that are not finite cannot be saved"):
@@ -180,8 +225,17 @@ def _with(**entries):
     [
         (_without("format"), 'not a scenario file: "format" must be "hydrone_gym scenario"'),
         (_with(format="other"), 'not a scenario file: "format" must be "hydrone_gym scenario"'),
-        (_with(version=2), '"version" must be 1, got 2'),
-        (_without("version"), '"version" must be 1, got None'),
+        (_with(version=3), '"version" must be 1 or 2, got 3'),
+        (_without("version"), '"version" must be 1 or 2, got None'),
+        (_with(version=2), "missing key 'weather'"),
+        (_with(weather=asdict(SQUALL)), "unknown key 'weather'"),
+        (_with(version=2, weather=None), '"weather" must be an object with a "spread", got None'),
+        (_with(version=2, weather={"wind": 1.0}), '"weather" must be an object with a "spread"'),
+        (_with(version=2, weather={"gale": 1, "air": 2, "spread": {}}), "weather: unknown key 'air', 'gale'"),
+        (_with(version=2, weather={"spread": {"weight": 0.1}}), "weather: unknown key 'weight'"),
+        (_with(version=2, weather={"wind": math.nan, "spread": {}}), r"Weather.wind must lie between .*, got nan"),
+        (_with(version=2, weather={"wind": 10**400, "spread": {}}), r"Weather.wind must lie between .*, got 1000"),
+        (_with(version=2, weather={"spread": {"height": [0.1]}}), r"Spread.height must be \(least, greatest\) .*\(m\)"),
         (_without("goal"), "missing key 'goal'"),
         (_with(wind=1, air=2), "unknown key 'air', 'wind'"),
         (_with(goal=[1, 2]), r"goal must be a list of 3 finite numbers, got \[1, 2\]"),
