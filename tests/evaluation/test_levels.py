@@ -92,7 +92,7 @@ def test_a_trace_in_weather_passes_through_the_states():
         flown = flight.references, began.scenario.obstacles, began.conditions
         again = trajectory(simulation, began.episodes.rows, *flown)[1]
         np.testing.assert_array_equal(again, flight.trace.states)
-    with pytest.raises(ValueError, match="weather must be given, as in the simulation"):
+    with pytest.raises(ValueError, match="conditions must be given where the simulation has weather"):
         trajectory(simulation, began.episodes.rows, flight.references)
 
 
