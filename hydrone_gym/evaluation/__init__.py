@@ -6,7 +6,16 @@ from hydrone_gym.evaluation.provenance import made_with
 from hydrone_gym.evaluation.records import Record, read_records
 from hydrone_gym.evaluation.run import EvaluationStopped, evaluate, evaluate_held_out
 from hydrone_gym.evaluation.statistics import percentiles, wilson_interval
-from hydrone_gym.evaluation.suites import HELD_OUT, MISSIONS, Mission, Suite, frozen_suites, load_suite, save_suite
+from hydrone_gym.evaluation.suites import (
+    HELD_OUT,
+    MISSIONS,
+    Mission,
+    Suite,
+    frozen_suites,
+    load_suite,
+    load_suites,
+    save_suite,
+)
 
 __all__ = [
     "DEFAULT_POLICIES",
@@ -27,6 +36,7 @@ __all__ = [
     "frozen_suites",
     "known_policies",
     "load_suite",
+    "load_suites",
     "made_with",
     "percentiles",
     "read_records",

@@ -124,7 +124,12 @@ def trajectory(
     Returns:
         Times (N,) in s, states (N, 12), the moving references (N, 4), the final row, and the conditions
         (N, CONDITIONS), empty without weather. Ends early with the outcome.
+
+    Raises ValueError for a simulation with weather and no conditions, or the other way round.
     """
+    if simulation.weathered != (conditions.size > 0):
+        rule = "given where the simulation has weather" if simulation.weathered else "left out where it has none"
+        raise ValueError(f"conditions must be {rule}, got shape {conditions.shape}")
     # a copy, since a read-only array would compile another version of the kernel
     spheres = np.zeros((0, 4)) if obstacles is None else np.array(obstacles, dtype=np.float64)
     closest = np.full((1, len(spheres)), np.inf)

@@ -86,9 +86,14 @@ def test_a_trace_in_weather_passes_through_the_states():
     whole = flight.states[:-1]
     np.testing.assert_array_equal(flight.trace.states[: 10 * len(whole) : 10], whole)
     np.testing.assert_array_equal(flight.trace.states[-1], flight.states[-1])
-    simulation = env.get_wrapper_attr("simulation")
-    with pytest.raises(ValueError, match="weather must be given, as in the simulation"):
-        trajectory(simulation, env.unwrapped._core.episodes.rows, flight.references)
+    env.reset(seed=2)
+    simulation, began = env.get_wrapper_attr("simulation"), env.unwrapped.get_state()
+    for _ in range(2):  # what it began in is not changed
+        flown = flight.references, began.scenario.obstacles, began.conditions
+        again = trajectory(simulation, began.episodes.rows, *flown)[1]
+        np.testing.assert_array_equal(again, flight.trace.states)
+    with pytest.raises(ValueError, match="conditions must be given where the simulation has weather"):
+        trajectory(simulation, began.episodes.rows, flight.references)
 
 
 def test_tables_count_success_and_failures():
