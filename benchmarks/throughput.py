@@ -64,6 +64,8 @@ def environments(settings: Settings) -> dict[str, Any]:
             add(vector(count, "near", f"vector {count}, near"))
         for count in SIZES[1:]:
             add(vector(count, "uniform", f"vector {count}, uniform"))
+        for level in (1, 5):
+            add(vector(1024, "near", f"vector 1024, near, weather {level}", weather=level))
         if has_egocentric():
             for count in SIZES[1:]:
                 add(vector(count, "uniform", f"egocentric {count}", interface="egocentric"))
