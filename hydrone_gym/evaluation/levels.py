@@ -71,7 +71,7 @@ def level_overview(summaries: Sequence[MissionSummary]) -> list[Table]:
             for name, entries in flown.items()
         )
         heads = ("policy", *(f"level {level}" for level in levels))
-        return [Table(f"{mission}: success (%) by level of weather", heads, rows, tuple(flown))]
+        return [Table(f"{mission}: success (%) by level", heads, rows, tuple(flown))]
     return []
 
 
