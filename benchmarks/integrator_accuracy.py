@@ -44,7 +44,7 @@ def largest_error(vehicle, position, references):
     start, reference = np.array([*position, *np.zeros(9)]), [*position, 0.0]
     exact = exact_states(vehicle, start, reference, references)
     aside = exact_states(vehicle, start + 1e-3 * np.eye(12)[0], reference, references)
-    _, states, *_ = trajectory(Simulation(vehicle, OPEN), row_at(start), references)
+    _, states, _, _ = trajectory(Simulation(vehicle, OPEN), row_at(start), references)
     return [np.linalg.norm(other[:, :3] - exact[:, :3], axis=1).max() for other in (states, aside)]
 
 

@@ -77,7 +77,7 @@ def respond(vehicle: Vehicle, step: Step) -> Response:
     start, move = np.array(step.start, float), np.array(step.move, float)
     state = np.array([*start, 0.0, 0.0, step.heading, *np.zeros(6)])
     references = np.tile([*(start + move), 0.0], (round(step.duration / simulation.period), 1))
-    times, states, _, row, _ = trajectory(simulation, row_at(state), references)
+    times, states, _, row = trajectory(simulation, row_at(state), references)
     if row["outcome"][0] != 0:
         raise RuntimeError(f"{vehicle.name}: {step.name} ended early with outcome {int(row['outcome'][0])}")
     distance = np.linalg.norm(states[:, :3] - (start + move), axis=1)
@@ -103,7 +103,7 @@ def hold(vehicle: Vehicle, surge: float, sway: float, duration: float = 20.0) ->
     state = np.array([0.0, 0.0, -3.0, 0.0, 0.0, 0.0, surge, sway, 0.0, 0.0, 0.0, 0.0])
     references = np.tile([0.0, 0.0, -3.0, 0.0], (round(duration / 0.5), 1))
     references[:, :2] = [0.1 * surge, 0.1 * sway]  # where a planner anchors the reference of a stop
-    times, states, *_ = trajectory(Simulation(vehicle, WORLD), row_at(state), references)
+    times, states, _, _ = trajectory(Simulation(vehicle, WORLD), row_at(state), references)
     speed = np.linalg.norm(states[:, 6:9], axis=1)
     moving = np.flatnonzero(speed >= 0.02)
     drift = np.linalg.norm(states[:, :2], axis=1).max()

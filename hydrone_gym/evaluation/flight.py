@@ -208,5 +208,6 @@ def trace_of(
 ) -> Trace:
     """Play references again from a state, tick by tick: the same kernel, so the same flight bit for bit."""
     row = row_at(start, np.array(scenario.goal))
-    flown = trajectory(simulation, row, references, scenario.obstacles, conditions)
-    return Trace(*flown[:3], flown[4])
+    around: list[NDArray[np.float64]] = []
+    times, states, moving, _ = trajectory(simulation, row, references, scenario.obstacles, conditions, around)
+    return Trace(times, states, moving, np.array(around))

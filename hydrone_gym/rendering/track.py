@@ -53,8 +53,9 @@ class Track:
         `simulation` is of the flight's vehicle, world and period, with one lane.
         """
         for row, reference, conditions in self._waiting:
-            flown = trajectory(simulation, row, reference[None], self.obstacles, conditions)
-            self._parts.append(np.hstack((flown[1], flown[2], flown[4]))[1:])
+            around: list[NDArray[np.float64]] = []
+            _, states, moving, _ = trajectory(simulation, row, reference[None], self.obstacles, conditions, around)
+            self._parts.append(np.hstack((states, moving, around))[1:])
         self._waiting = []
         self._parts = [np.concatenate(self._parts)]
         return self._parts[0]

@@ -111,7 +111,8 @@ def trajectory(
     references: ArrayLike,
     obstacles: ArrayLike | None = None,
     conditions: NDArray[np.float64] = STILL,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], np.ndarray, NDArray[np.float64]]:
+    around: list[NDArray[np.float64]] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], np.ndarray]:
     """Play a sequence of references from a row and sample every tick, with the same numbers as whole periods give.
 
     Args:
@@ -120,10 +121,10 @@ def trajectory(
         references: (K, 4) one reference a period (m, m, m, rad).
         obstacles: (M, 4) spheres x, y, z, r in m.
         conditions: (1, CONDITIONS) of a simulation with weather; not changed.
+        around: gets the conditions (CONDITIONS,) of every sample, if given.
 
     Returns:
-        Times (N,) in s, states (N, 12), the moving references (N, 4), the final row, and the conditions
-        (N, CONDITIONS), empty without weather. Ends early with the outcome.
+        Times (N,) in s, states (N, 12), the moving references (N, 4), and the final row. Ends early with the outcome.
 
     Raises ValueError for a simulation with weather and no conditions, or the other way round.
     """
@@ -137,7 +138,8 @@ def trajectory(
     row, conditions = row.copy(), conditions.copy()
     start = row["ticks"][0]
     times, states, moving = [0.0], [row["state"][0].copy()], [row["reference"][0].copy()]
-    around = [conditions[0].copy()]
+    around = [] if around is None else around
+    around.append(conditions[0].copy())
     for reference in np.asarray(references, dtype=np.float64, order="C"):
         old = row["reference"][0].copy()
         turn = (reference[3] - old[3] + np.pi) % (2.0 * np.pi) - np.pi
@@ -149,8 +151,8 @@ def trajectory(
             states.append(row["state"][0].copy())
             moving.append(old + move * ((tick + 1) / simulation.ticks))
             if row["outcome"][0] != 0:
-                return np.array(times), np.array(states), np.array(moving), row, np.array(around)
-    return np.array(times), np.array(states), np.array(moving), row, np.array(around)
+                return np.array(times), np.array(states), np.array(moving), row
+    return np.array(times), np.array(states), np.array(moving), row
 
 
 def row_at(state: NDArray[np.float64], goal: NDArray[np.float64] | None = None) -> np.ndarray:
