@@ -147,7 +147,8 @@ def test_a_policy_that_raises_gives_1(tmp_path, capsys):
     options = ["--agent", f"{tmp_path / 'leaky.py'}:Leaky", "--episodes", "1", "--out", str(tmp_path)]
     assert main(["failures", *options]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert "failed in suite held-out, mission HydroneGym/Mission-v0, world 0: TypeError" in line
+    assert "failed in suite held-out, mission HydroneGym/Mission-v0, world 0: ValueError" in line
+    assert "predict must return (action, state), got NoneType" in line
 
 
 @pytest.mark.parametrize("mission", MISSIONS)
