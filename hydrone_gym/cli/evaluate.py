@@ -33,8 +33,7 @@ LOCAL = ("loky", "threading")  # backends whose workers share this machine
 class Evaluate:
     """Fly policies through the same worlds and say how they compare.
 
-    The same command again goes on where an evaluation was stopped;
-    one that asks for more flies only that.
+    The same command goes on where it was stopped, and flies only what is missing.
     """
 
     suites: tuple[str, ...] = ("paper-20",)
