@@ -8,6 +8,7 @@ import pytest
 
 from hydrone_gym import cli
 from hydrone_gym.evaluation import read_records
+from tests.cli.test_evaluate import remarks
 
 POLICY = """
 import sys, time
@@ -60,7 +61,7 @@ def told(capsys):
     """The one line on stderr, nothing on stdout."""
     out, err = capsys.readouterr()
     assert out == ""
-    (line,) = err.splitlines()
+    (line,) = remarks(err)
     assert line.startswith("hydrone: error: ")
     return line
 
@@ -80,10 +81,8 @@ def test_a_policy_that_fails_in_flight_gives_1_and_its_rule(how, written, tmp_pa
 def test_fly_says_the_same(how, written, tmp_path, capsys):
     predict, message = ANSWERS[how]
     policy = written(predict).removeprefix("mine=")
-    assert (
-        cli.main(["fly", "--policy", policy, "--mission", "air-to-water", "--out", f"{tmp_path}/out", "--no-figures"])
-        == 2
-    )
+    options = ["--mission", "air-to-water", "--out", str(tmp_path / "out"), "--no-figures"]
+    assert cli.main(["fly", "--policy", policy, *options]) == 2
     assert message in told(capsys)
 
 
