@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from hydrone_gym.envs.hydrone_env import HydroneEnv
 from hydrone_gym.evaluation.policies import Policy
-from hydrone_gym.simulation.conditions import weather_at
+from hydrone_gym.simulation.conditions import DRIVEN, weather_at
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import STILL, Simulation, row_at, trajectory
+from hydrone_gym.surface import in_air
 from hydrone_gym.world.scenario import Scenario
 
 _TOLD = ("outcome", "time", "energy", "clearance", "transitions")  # by the last `info` of an episode
@@ -32,6 +33,11 @@ class Trace(NamedTuple):
     def weather(self) -> dict[str, NDArray[np.float64]]:
         """`wind` and `water` around the vehicle, (N, 3) in m/s, and `elevation` (N,) in m; nothing without weather."""
         return weather_at(self.conditions, 1, len(self.times)) if self.conditions.size else {}
+
+    @property
+    def driven(self) -> NDArray[np.bool_]:
+        """Whether the controller takes the vehicle to be in air, (N,)."""
+        return self.conditions[:, DRIVEN] > 0.0 if self.conditions.size else in_air(self.states[:, 2])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,16 +17,16 @@ from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
 from hydrone_gym.rendering.files import drawn_width, save_figure
 from hydrone_gym.simulation.simulation import TICK, Simulation
 from hydrone_gym.simulation.storage import vehicle_of, world_of
-from hydrone_gym.surface import is_air
 
 
 @kernel
 def _write_references(
-    states: NDArray, moving: NDArray, values: NDArray[np.float64], gains: Any, out: NDArray[np.float64]
+    states: NDArray, airs: NDArray, moving: NDArray, values: NDArray[np.float64], gains: Any, out: NDArray[np.float64]
 ) -> None:
     """Write the attitude reference (φ, θ, ψ) of every sample; NaN where a law has none.
 
-    Shapes: states (N, 12), moving (N, 4), values packed `Model`, gains of the law, out (N, 3).
+    Shapes: states (N, 12), airs (N,) whether the controller takes it to be in air, moving (N, 4), values packed
+    `Model`, gains of the law, out (N, 3).
     """
     vehicle, world = vehicle_of(values), world_of(values)
     for n in range(states.shape[0]):
@@ -35,7 +35,7 @@ def _write_references(
         old, new = moving[max(n - 1, 0)], moving[n]
         vx, vy, vz = (new[0] - old[0]) / TICK, (new[1] - old[1]) / TICK, (new[2] - old[2]) / TICK
         reference = Reference(new[0], new[1], new[2], new[3], vx, vy, vz)
-        attitude, air = attitude_of(state), is_air(state.z)
+        attitude, air = attitude_of(state), airs[n]
         rates = euler_rates(attitude, state.p, state.q, state.r)
         vertical = abs(state.z) <= world.zone and world.vertical_mode > 0.0
         now = Instant(state, attitude, rates, reference, vertical, air, medium_at(vehicle, air))
@@ -49,7 +49,7 @@ def attitude_references(simulation: Simulation, trace: Trace) -> NDArray[np.floa
     """
     out = np.empty((len(trace.times), 3))
     gains = named_law(simulation.law).gains_of(simulation.vehicle)
-    _write_references(trace.states, trace.references, simulation.values, gains, out)
+    _write_references(trace.states, trace.driven, trace.references, simulation.values, gains, out)
     return out
 
 
@@ -75,16 +75,16 @@ def draw_flight(
     title, zone = title or name[:1].upper() + name[1:].replace("-", " "), world.zone
     ending = f"{title}: {flight.outcome.name.lower().replace('_', ' ')} after {flight.time:.1f} s"
     weather = flight.trace.weather
-    elevations = weather.get("elevation")
+    level: dict[str, Any] = {"elevations": weather.get("elevation", 0.0)}
     spheres = (flight.detected, flight.undetected)
-    look: dict[str, Any] = {"world": world, "width": drawn_width(width, WIDTH), "title": ending}
+    look: dict[str, Any] = {"world": world, "width": drawn_width(width, WIDTH), "title": ending, **level}
     figures = {
         "path": plot_path(position, flight.scenario.goal, *spheres, **look),
         "position": plot_position(
-            times, position, references[:, :3], zone=zone, title=f"{title}: position over time", elevations=elevations
+            times, position, references[:, :3], zone=zone, title=f"{title}: position over time", **level
         ),
         "attitude": plot_attitude(
-            times, states[:, 3:6], wanted, states[:, 2], zone=zone, title=f"{title}: attitude over time"
+            times, states[:, 3:6], wanted, states[:, 2], zone=zone, title=f"{title}: attitude over time", **level
         ),
     }
     if weather:

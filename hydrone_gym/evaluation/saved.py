@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from hydrone_gym.simulation.conditions import CONDITIONS
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.simulation.simulation import STILL, Simulation
 from hydrone_gym.vehicle import named_vehicle
-from hydrone_gym.world.scenario import Scenario
+from hydrone_gym.world.scenario import Scenario, weather_of
 
 FORMAT = "hydrone_gym flights"
 VERSION = 1
@@ -30,9 +30,12 @@ def flight_record(flight: Flight) -> dict[str, Any]:
     """
     p50, p99 = percentiles(flight.decision_ms, (50.0, 99.0))
     measured = ("time", "transitions", "clearance", "length", "energy", "episode_return")
+    scenario = {name: getattr(flight.scenario, name) for name in ("name", "start", "goal", "obstacles")}
+    if flight.scenario.weather is not None:
+        scenario["weather"] = asdict(flight.scenario.weather)
     return plain(
         {
-            "scenario": {name: getattr(flight.scenario, name) for name in ("name", "start", "goal", "obstacles")},
+            "scenario": scenario,
             "outcome": flight.outcome.name,
             "success": flight.outcome is Outcome.GOAL,
             **{name: getattr(flight, name) for name in measured},
@@ -111,13 +114,18 @@ def _flight(record: dict[str, Any], document: dict[str, Any]) -> SavedFlight:
         seed=int(document["seed"]),
         vehicle=document["vehicle"],
         weather=int(document.get("weather", 0)),
-        scenario=Scenario(**record["scenario"]),
+        scenario=_scenario(record["scenario"]),
         references=references,
         states=states,
         detected=_rows("detected", record["detected"], 4),
         conditions=_rows("conditions", [record["conditions"]], CONDITIONS) if "conditions" in record else STILL,
         record={**record, **{name: float(record[name]) for name in ("time", "energy", "length", "episode_return")}},
     )
+
+
+def _scenario(content: dict[str, Any]) -> Scenario:
+    """Return a saved scenario, with its weather if it carries one."""
+    return Scenario(**content | ({"weather": weather_of(content["weather"])} if "weather" in content else {}))
 
 
 def _rows(name: str, rows: Any, width: int) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import side_azimuth
@@ -45,19 +45,20 @@ def plot_path(
     world: World = _BOX,
     title: str = "",
     width: float = WIDTH,
+    elevations: ArrayLike = 0.0,
 ) -> Figure:
     """Draw an executed path (N, 3) in its world (paper, Figs. 6 and 9), solid in air, dashed under water.
 
     Obstacles (k, BODY) are black where detected, else faint. A sphere around the goal, to scale, is where the flight
-    arrives. `width` is in inches.
+    arrives. `width` is in inches, `elevations` (N,) are those of the surface at the vehicle, m.
     """
     scene = Scene(world.lower, world.upper, azimuth=side_azimuth(positions[0], goal), width=width)
     scene.obstacles(undetected, style.FAINT, alpha=0.55)
     scene.obstacles(detected, style.DETECTED)
-    air, water = split_media(positions)
+    air, water = split_media(positions, elevations)
     scene.lines(air, style.RED, 2.8, hidden=0.5)
     scene.lines([piece for line in water for piece in dash(line, _DASH, _GAP)], style.RED, 2.8, hidden=0.5)
-    for number, point in enumerate(crossing_points(positions)):
+    for number, point in enumerate(crossing_points(positions, elevations)):
         scene.mark(point, "o", style.BLUE, 11, "" if number else "crossing", hollow=True)
     red: Look = {"color": style.RED, "linewidth": 2.8}
     entries = {"path in air": red} if air else {}
@@ -93,20 +94,21 @@ def plot_position(
     *,
     zone: float = 0.8,
     title: str = "",
-    elevations: Array | None = None,
+    elevations: ArrayLike = 0.0,
 ) -> Figure:
     """Draw x, y, z (N, 3) over time (N,), executed and reference (paper, Figs. 7 and 10).
 
     `zone` (m) is half the height of the transition zone: a band in z, and the time spent inside it in every panel.
-    `elevations` (N,) are those of the surface at the vehicle, m; None for flat water.
+    `elevations` (N,) are those of the surface at the vehicle, m.
     """
     labels = ("x (m)", "y (m)", "z (m)")
-    figure = _histories(title, times, labels, positions, references, positions[:, 2], zone)
+    heights = positions[:, 2], elevations
+    figure = _histories(title, times, labels, positions, references, heights, zone)
     figure.axes[2].axhspan(-zone, zone, alpha=0.22, **_ZONE)
-    if elevations is None:
-        figure.axes[2].axhline(0.0, color=style.BLUE, linewidth=1.0)
-    else:
+    if np.ndim(elevations):
         figure.axes[2].plot(times, elevations, color=style.BLUE, linewidth=1.0)
+    else:
+        figure.axes[2].axhline(elevations, color=style.BLUE, linewidth=1.0)
     return figure
 
 
@@ -134,19 +136,26 @@ def plot_weather(times: Array, winds: Array, waters: Array, elevations: Array, *
 
 
 def plot_attitude(
-    times: Array, attitudes: Array, references: Array, heights: Array, *, zone: float = 0.8, title: str = ""
+    times: Array,
+    attitudes: Array,
+    references: Array,
+    heights: Array,
+    *,
+    zone: float = 0.8,
+    title: str = "",
+    elevations: ArrayLike = 0.0,
 ) -> Figure:
     """Draw roll, pitch and yaw (N, 3) in rad over time (N,), executed and reference (paper, Figs. 8 and 11).
 
     A reference is what the control laws track, NaN where a law has none. `heights` (N,) and half the height of the
-    transition `zone`, in m, tell when the vehicle is inside it.
+    transition `zone`, in m, tell when the vehicle is inside it; with `elevations` (N,) when it crosses the surface.
     """
     yaw = np.unwrap(attitudes[:, 2])
     nearest = yaw + (references[:, 2] - yaw + np.pi) % (2.0 * np.pi) - np.pi
     executed = np.degrees(np.column_stack((attitudes[:, :2], yaw)))
     wanted = np.degrees(np.column_stack((references[:, :2], nearest)))
     labels = ("roll φ (°)", "pitch θ (°)", "yaw ψ (°)")
-    figure = _histories(title, times, labels, executed, wanted, heights, zone)
+    figure = _histories(title, times, labels, executed, wanted, (heights, elevations), zone)
     for panel in figure.axes:
         low, high = panel.get_ylim()
         if high - low < _LEAST_ANGLE_RANGE:
@@ -155,15 +164,24 @@ def plot_attitude(
 
 
 def _histories(
-    title: str, times: Array, labels: Sequence[str], executed: Array, references: Array, heights: Array, zone: float
+    title: str,
+    times: Array,
+    labels: Sequence[str],
+    executed: Array,
+    references: Array,
+    heights: tuple[Array, ArrayLike],
+    zone: float,
 ) -> Figure:
-    """Return three panels over time, executed red, reference dotted black, with the time in the zone and crossings."""
+    """Return three panels over time, executed red, reference dotted black, with the time in the zone and crossings.
+
+    `heights` (m) are the vehicle's and the surface's.
+    """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    air, inside = in_air(heights), np.abs(heights) <= zone
+    air, inside = in_air(np.subtract(*heights)), np.abs(heights[0]) <= zone
     crossings = times[1:][air[1:] != air[:-1]]
     with rc_context(style.FONTS):
         figure = Figure(figsize=(WIDTH, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")

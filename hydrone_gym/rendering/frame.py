@@ -57,18 +57,18 @@ class Painter:
         """Everything that is drawn; `unit` (m) is a pixel at the path."""
         now = moment.ticks[-1]
         end, sent = (self._unit(pose, point) for point in (moment.goal, now[12:15]))
+        outdoors = moment.outdoors(self.world)
         veiled = gaps_along(pose.eye, now[:3], moment.obstacles) < self.vehicle.radius  # they would hide the vehicle
         parts = (
             shapes.obstacles(moment.obstacles, moment.detected, veiled & self._following),
             shapes.vehicle(now[:12], self.vehicle.arm, scale),
             shapes.shadow(now[:3], self.world.lower[2], 1.15 * scale * self.vehicle.radius),
             shapes.path(moment.ticks[:, :3], max(0.02, 1.6 * unit)),
-            shapes.plumb(now[:3], 0.8 * unit),
+            shapes.plumb(now[:3], 0.8 * unit, outdoors.level if outdoors else 0.0),
             shapes.plumb(moment.goal, 0.8 * end),
             shapes.goal(moment.goal, self.world.goal_radius, pose, max(0.35, 8.0 * end), 1.6 * end),
             shapes.reference(now[12:15], pose, max(0.15, 4.5 * sent), max(0.014, 1.1 * sent)),
         )
-        outdoors = moment.outdoors(self.world)
         return np.vstack(parts if outdoors is None else (*parts, shapes.weather(outdoors, max(0.03, 1.4 * unit))))
 
 
@@ -91,6 +91,9 @@ def _write(image: NDArray[np.uint8], text: str, colour: str) -> None:
     size = max(12, image.shape[0] // 24)
     margin = size // 2
     paint, opacity = _label(text, colour, size)
+    if paint.shape[1] > image.shape[1] - margin:  # smaller letters rather than less of them
+        size = max(8, size * (image.shape[1] - margin) // paint.shape[1])
+        paint, opacity = _label(text, colour, size)
     paint, opacity = paint[:, : image.shape[1] - margin], opacity[:, : image.shape[1] - margin]
     part = image[-margin - paint.shape[0] : -margin, margin : margin + paint.shape[1]]
     part[:] = np.rint(part + opacity * (paint - part))

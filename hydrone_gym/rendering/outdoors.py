@@ -24,6 +24,7 @@ class Outdoors(NamedTuple):
     wind: NDArray[np.float64]  # (2, 3) from above the vehicle (m) along the wind; equal ends without wind
     current: NDArray[np.float64]  # (2, 3) from below it, for the water
     waves: NDArray[np.float64]  # (L, P, 3) lines on the surface, m; none where it is flat
+    level: float  # of the surface at the vehicle, m
     words: str
 
 
@@ -45,6 +46,7 @@ def outdoors(conditions: NDArray[np.float64], position: NDArray[np.float64], tim
         _arrow(position + _ABOVE, WIND_SCALE * wind, WIND_SCALE * _LEAST),
         _arrow(position - _ABOVE, CURRENT_SCALE * water, CURRENT_SCALE * _LEAST),
         np.concatenate((places, level[..., None]), axis=-1)[: 0 if flat else None],
+        float(elevation(now.sea, *position[:2], time)),
         ", ".join(word for word, shown in zip(words, there, strict=True) if shown),
     )
 

@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hydrone_gym.surface import in_air
 
@@ -15,27 +15,33 @@ def along(line: Line) -> NDArray[np.float64]:
     return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
 
 
-def _crossings(line: Line) -> tuple[NDArray[np.intp], NDArray[np.float64], Line]:
+def _crossings(line: Line, level: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.float64], Line]:
     """Return the segments that lead from one medium into the other, how far along them (0 to 1), and where."""
-    air, z = in_air(line[:, 2]), line[:, 2]
+    level = np.broadcast_to(level, len(line))
+    z = line[:, 2] - level
+    air = in_air(z)
     first = np.flatnonzero(air[:-1] != air[1:])
     share = z[first] / (z[first] - z[first + 1])
     points = line[first] + share[:, None] * (line[first + 1] - line[first])
-    points[:, 2] = 0.0
+    points[:, 2] = level[first] + share * (level[first + 1] - level[first])
     return first, share, points
 
 
-def crossing_points(line: Line) -> Line:
-    """Return where a path crosses the surface, (c, 3), interpolated between samples."""
-    return _crossings(line)[2]
+def crossing_points(line: Line, level: ArrayLike = 0.0) -> Line:
+    """Return where a path crosses the surface, (c, 3), interpolated between samples.
+
+    The surface is at a level (m), one for all of the path or one for each point (n,), as where there are waves.
+    """
+    return _crossings(line, level)[2]
 
 
-def _split(line: Line) -> tuple[Line, NDArray[np.bool_]]:
+def _split(line: Line, level: ArrayLike = 0.0) -> tuple[Line, NDArray[np.bool_]]:
     """Return a polyline with a point added wherever it crosses the surface, and which segments are under water."""
-    first, share, points = _crossings(line)
+    first, share, points = _crossings(line, level)
     inner = (share > 0.0) & (share < 1.0)
+    height = np.insert(line[:, 2] - level, first[inner] + 1, 0.0)
     line = np.insert(line, first[inner] + 1, points[inner], axis=0)
-    return line, ~in_air(0.5 * (line[:-1, 2] + line[1:, 2]))
+    return line, ~in_air(0.5 * (height[:-1] + height[1:]))
 
 
 def _cut(line: Line, change: NDArray[np.bool_]) -> list[Line]:
@@ -44,9 +50,9 @@ def _cut(line: Line, change: NDArray[np.bool_]) -> list[Line]:
     return [line[first : last + 1] for first, last in itertools.pairwise(cuts) if last > first]
 
 
-def split_media(line: Line) -> tuple[list[Line], list[Line]]:
-    """Cut a path at the surface into its parts in air and its parts under water."""
-    line, wet = _split(line)
+def split_media(line: Line, level: ArrayLike = 0.0) -> tuple[list[Line], list[Line]]:
+    """Cut a path at the surface, see `crossing_points`, into its parts in air and its parts under water."""
+    line, wet = _split(line, level)
     parts = _cut(line, wet[1:] != wet[:-1])
     begins_wet = int(wet[:1].any())
     return parts[begins_wet::2], parts[1 - begins_wet :: 2]

@@ -107,10 +107,10 @@ def weather(seen: Outdoors, radius: float) -> Shapes:
     return np.vstack(parts)
 
 
-def plumb(point: NDArray[np.float64], radius: float) -> Shapes:
-    """A thin vertical line from a point (3,) in m to the water surface."""
-    foot = np.array([point[0], point[1], 0.0])
-    return _rows(CAPSULE, point, foot, radius, _PLUMB)[: int(abs(point[2]) > 1e-3)]
+def plumb(point: NDArray[np.float64], radius: float, level: float = 0.0) -> Shapes:
+    """A thin vertical line from a point (3,) in m to the water surface, whose level (m) may be another in waves."""
+    foot = np.array([point[0], point[1], level])
+    return _rows(CAPSULE, point, foot, radius, _PLUMB)[: int(abs(point[2] - level) > 1e-3)]
 
 
 def goal(position: NDArray[np.float64], reach: float, pose: Pose, arm: float, radius: float) -> Shapes:

@@ -86,8 +86,8 @@ class Stage:
         turn = Rotation.from_euler("ZXY", state[[5, 3, 4]])
         self._vehicle.position, self._vehicle.wxyz = state[:3], turn.as_quat(scalar_first=True)
         self._reference.position = reference
-        self._plumb.points = np.stack((state[:3], state[:3] * [1.0, 1.0, 0.0]))[None]
         outdoors = moment.outdoors(self._world)
+        self._plumb.points = np.stack((state[:3], (*state[:2], outdoors.level if outdoors else 0.0)))[None]
         self._label.text = ", ".join(moment.words(self._world.zone) + ((outdoors.words,) if outdoors else ()))
         if outdoors is not None:
             self._blow(outdoors)

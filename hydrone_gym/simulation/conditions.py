@@ -100,6 +100,7 @@ class Climate(NamedTuple):
 
 
 AT = offsets_of(Conditions)
+DRIVEN = AT.noticed + offsets_of(Noticed).driven
 EXTRA = size_of(Conditions)  # a disturbance's numbers
 CONDITIONS = EXTRA + MOST
 _EXTRA_OF_CLIMATE = size_of(Climate)

@@ -10,6 +10,7 @@ from hydrone_gym.simulation.clock import DT, TICK
 from hydrone_gym.simulation.conditions import (
     A_TICK,
     AT,
+    DRIVEN,
     EXTRA,
     TICKS_FROM,
     Chances,
@@ -33,7 +34,6 @@ from hydrone_gym.weather.wind import Gusts, WindParams
 _RADIUS = AT.real + offsets_of(Unmodelled).near_water_radius
 _SHEAR = AT.wind + offsets_of(WindParams).shear
 _SECOND = AT.sea + offsets_of(Sea).second  # amplitude of a sea's second component
-_DRIVEN = AT.noticed + offsets_of(Noticed).driven
 
 
 @inlined
@@ -101,7 +101,7 @@ def _sum(a, b):
 @inlined
 def takes_for_air(memory, i, lanes):
     """Whether lane i's controller takes it to be in air."""
-    return gather(memory, _DRIVEN, i, lanes, float) > 0.0
+    return gather(memory, DRIVEN, i, lanes, float) > 0.0
 
 
 @inlined

@@ -173,11 +173,11 @@ def _parse(text: str) -> Scenario:
             raise ValueError(f"{name} must be a list of {length} finite numbers, got {row!r}")
     given = {key: content[key] for key in known - {"format", "version"}}
     if "weather" in given:
-        given["weather"] = _weather_of(given["weather"])
+        given["weather"] = weather_of(given["weather"])
     return Scenario(**given)
 
 
-def _weather_of(content: Any) -> Weather:
+def weather_of(content: Any) -> Weather:
     """Rebuild a weather from what `dataclasses.asdict` made of it; ValueError says what is wrong."""
     if not isinstance(content, dict) or not isinstance(content.get("spread"), dict):
         raise ValueError(f'"weather" must be an object with a "spread", got {content!r}')

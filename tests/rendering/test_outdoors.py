@@ -8,11 +8,19 @@ from numba import njit
 import hydrone_gym
 from hydrone_gym import Weather
 from hydrone_gym.cli import main
+from hydrone_gym.cli.replay import _restored
 from hydrone_gym.evaluation import fly
+from hydrone_gym.evaluation.flight_figures import attitude_references
 from hydrone_gym.evaluation.saved import read_flights, restore
+from hydrone_gym.rendering import shapes
+from hydrone_gym.rendering.figures import plot_position
+from hydrone_gym.rendering.frame import _write
 from hydrone_gym.rendering.outdoors import CURRENT_SCALE, WIND_SCALE, barbed
+from hydrone_gym.rendering.paths import crossing_points, split_media
 from hydrone_gym.rendering.track import moment_of
+from hydrone_gym.simulation import conditions
 from hydrone_gym.weather import waves
+from hydrone_gym.world.scenario import Scenario, save_scenario
 from planners import StraightLine
 
 STORM = Weather(wind=4.0, current=0.3, wave_height=0.4, wave_period=2.5, sea="jonswap")
@@ -100,3 +108,58 @@ def test_a_snapshot_keeps_the_path_flown_in_weather():
     env.step(np.array([-8.0, -8.0, 6.0, 0.0]))
     env.unwrapped.set_state(snapshot)
     np.testing.assert_array_equal(env.render(), before)
+
+
+def test_a_path_crosses_the_surface_where_it_is():
+    line = np.array([[0.0, 0.0, 2.0], [1.0, 0.0, 0.5], [2.0, 0.0, 0.5], [3.0, 0.0, -1.0]])
+    level = np.array([0.0, 0.0, 1.0, 1.0])  # a crest comes
+    np.testing.assert_allclose(crossing_points(line, level), [[1.5, 0.0, 0.5]])
+    air, water = split_media(line, level)
+    assert [part[-1, 0] for part in air] == [1.5] and [part[0, 0] for part in water] == [1.5]
+    figure = plot_position(np.arange(4.0), line, line, elevations=level)
+    z = figure.axes[2].lines
+    assert [list(drawn.get_xdata()) for drawn in z if len(drawn.get_xdata()) == 2] == [[2.0, 2.0]]
+    np.testing.assert_array_equal(z[-1].get_ydata(), level)
+
+
+def test_plumb_lines_end_on_the_moving_surface():
+    env, flight = flown()
+    trace, level = flight.trace, moment_of(flight).outdoors(env.unwrapped.world).level
+    # the kernel looks at it in the middle of the last tick, half a tick of 0.05 s before
+    assert abs(level - trace.weather["elevation"][-1]) < 0.05
+    (line,) = shapes.plumb(trace.states[-1, :3], 0.01, level)
+    assert line[6] == level and line[3] == trace.states[-1, 2]
+
+
+def test_attitude_references_are_those_of_the_medium_the_controller_notices():
+    env, flight = flown()
+    trace, simulation = flight.trace, env.unwrapped.simulation
+    driven = trace.driven
+    assert (driven != (trace.states[:, 2] >= 0.0)).any()  # a crest or a trough
+    turned = trace.conditions.copy()
+    noticed = env.unwrapped.truth["conditions"]._fields.index("noticed")
+    assert noticed == 3 and (driven == (trace.conditions[:, conditions.DRIVEN] > 0.0)).all()
+    turned[:, conditions.DRIVEN] = 1.0
+    one = attitude_references(simulation, trace)
+    other = attitude_references(simulation, trace._replace(conditions=turned))
+    np.testing.assert_array_equal(one[driven], other[driven])
+    assert not np.array_equal(one[~driven], other[~driven], equal_nan=True)
+
+
+def test_captions_fit_into_small_pictures():
+    wide, narrow = np.zeros((240, 640, 3), np.uint8), np.zeros((240, 320, 3), np.uint8)
+    for image in (wide, narrow):
+        _write(image, "23.7 s   out of bounds   wind 10.5 m/s, water 0.9 m/s, waves 0.50 m", "#b04a00")
+        assert not image[:, -4:].any()  # its right end is rounded off within the picture
+        assert image.any()
+
+
+def test_a_saved_flight_keeps_the_weather_of_its_scenario(tmp_path, capsys):
+    scenario = Scenario(start=(-8.0, -8.0, 5.0, 0.0), goal=(-7.0, -8.0, 4.0), obstacles=(), weather=STORM)
+    save_scenario(scenario, tmp_path / "storm.json")
+    main(["fly", "--scenario", str(tmp_path / "storm.json"), "--out", str(tmp_path), "--no-figures"])
+    (saved,) = read_flights(tmp_path / "flight.json")
+    assert saved.scenario.weather == STORM
+    take = _restored(saved)
+    assert len(take.trees) == len(saved.references)
+    assert "otherwise" not in capsys.readouterr().err
