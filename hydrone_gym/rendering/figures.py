@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hydrone_gym.rendering import style
 from hydrone_gym.rendering.camera import side_azimuth
@@ -45,7 +45,7 @@ def plot_path(
     world: World = _BOX,
     title: str = "",
     width: float = WIDTH,
-    elevations: ArrayLike = 0.0,
+    elevations: Array | float = 0.0,
 ) -> Figure:
     """Draw an executed path (N, 3) in its world (paper, Figs. 6 and 9), solid in air, dashed under water.
 
@@ -94,7 +94,7 @@ def plot_position(
     *,
     zone: float = 0.8,
     title: str = "",
-    elevations: ArrayLike = 0.0,
+    elevations: Array | float = 0.0,
 ) -> Figure:
     """Draw x, y, z (N, 3) over time (N,), executed and reference (paper, Figs. 7 and 10).
 
@@ -105,7 +105,7 @@ def plot_position(
     heights = positions[:, 2], elevations
     figure = _histories(title, times, labels, positions, references, heights, zone)
     figure.axes[2].axhspan(-zone, zone, alpha=0.22, **_ZONE)
-    if np.ndim(elevations):
+    if isinstance(elevations, np.ndarray):
         figure.axes[2].plot(times, elevations, color=style.BLUE, linewidth=1.0)
     else:
         figure.axes[2].axhline(elevations, color=style.BLUE, linewidth=1.0)
@@ -143,7 +143,7 @@ def plot_attitude(
     *,
     zone: float = 0.8,
     title: str = "",
-    elevations: ArrayLike = 0.0,
+    elevations: Array | float = 0.0,
 ) -> Figure:
     """Draw roll, pitch and yaw (N, 3) in rad over time (N,), executed and reference (paper, Figs. 8 and 11).
 
@@ -169,7 +169,7 @@ def _histories(
     labels: Sequence[str],
     executed: Array,
     references: Array,
-    heights: tuple[Array, ArrayLike],
+    heights: tuple[Array, Array | float],
     zone: float,
 ) -> Figure:
     """Return three panels over time, executed red, reference dotted black, with the time in the zone and crossings.
@@ -181,7 +181,7 @@ def _histories(
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    air, inside = in_air(np.subtract(*heights)), np.abs(heights[0]) <= zone
+    air, inside = in_air(heights[0] - heights[1]), np.abs(heights[0]) <= zone
     crossings = times[1:][air[1:] != air[:-1]]
     with rc_context(style.FONTS):
         figure = Figure(figsize=(WIDTH, 6.4), dpi=style.DOTS_PER_INCH, layout="constrained")

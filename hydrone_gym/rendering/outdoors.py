@@ -46,7 +46,7 @@ def outdoors(conditions: NDArray[np.float64], position: NDArray[np.float64], tim
         _arrow(position + _ABOVE, WIND_SCALE * wind, WIND_SCALE * _LEAST),
         _arrow(position - _ABOVE, CURRENT_SCALE * water, CURRENT_SCALE * _LEAST),
         np.concatenate((places, level[..., None]), axis=-1)[: 0 if flat else None],
-        float(elevation(now.sea, *position[:2], time)),
+        float(elevation(now.sea, position[0], position[1], time)),
         ", ".join(word for word, shown in zip(words, there, strict=True) if shown),
     )
 

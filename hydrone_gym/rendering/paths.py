@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hydrone_gym.surface import in_air
 
@@ -15,7 +15,7 @@ def along(line: Line) -> NDArray[np.float64]:
     return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
 
 
-def _crossings(line: Line, level: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.float64], Line]:
+def _crossings(line: Line, level: NDArray[np.float64] | float) -> tuple[NDArray[np.intp], NDArray[np.float64], Line]:
     """Return the segments that lead from one medium into the other, how far along them (0 to 1), and where."""
     level = np.broadcast_to(level, len(line))
     z = line[:, 2] - level
@@ -27,7 +27,7 @@ def _crossings(line: Line, level: ArrayLike) -> tuple[NDArray[np.intp], NDArray[
     return first, share, points
 
 
-def crossing_points(line: Line, level: ArrayLike = 0.0) -> Line:
+def crossing_points(line: Line, level: NDArray[np.float64] | float = 0.0) -> Line:
     """Return where a path crosses the surface, (c, 3), interpolated between samples.
 
     The surface is at a level (m), one for all of the path or one for each point (n,), as where there are waves.
@@ -35,7 +35,7 @@ def crossing_points(line: Line, level: ArrayLike = 0.0) -> Line:
     return _crossings(line, level)[2]
 
 
-def _split(line: Line, level: ArrayLike = 0.0) -> tuple[Line, NDArray[np.bool_]]:
+def _split(line: Line, level: NDArray[np.float64] | float = 0.0) -> tuple[Line, NDArray[np.bool_]]:
     """Return a polyline with a point added wherever it crosses the surface, and which segments are under water."""
     first, share, points = _crossings(line, level)
     inner = (share > 0.0) & (share < 1.0)
@@ -50,7 +50,7 @@ def _cut(line: Line, change: NDArray[np.bool_]) -> list[Line]:
     return [line[first : last + 1] for first, last in itertools.pairwise(cuts) if last > first]
 
 
-def split_media(line: Line, level: ArrayLike = 0.0) -> tuple[list[Line], list[Line]]:
+def split_media(line: Line, level: NDArray[np.float64] | float = 0.0) -> tuple[list[Line], list[Line]]:
     """Cut a path at the surface, see `crossing_points`, into its parts in air and its parts under water."""
     line, wet = _split(line, level)
     parts = _cut(line, wet[1:] != wet[:-1])
