@@ -17,11 +17,13 @@ from hydrone_gym.rendering.figures import plot_position
 from hydrone_gym.rendering.frame import _write
 from hydrone_gym.rendering.outdoors import CURRENT_SCALE, WIND_SCALE, barbed
 from hydrone_gym.rendering.paths import crossing_points, split_media
+from hydrone_gym.rendering.replay import write_replay
 from hydrone_gym.rendering.track import moment_of
 from hydrone_gym.simulation import conditions
 from hydrone_gym.weather import waves
 from hydrone_gym.world.scenario import Scenario, save_scenario
 from planners import StraightLine
+from tests.rendering.replay_pages import read_page
 
 STORM = Weather(wind=4.0, current=0.3, wave_height=0.4, wave_period=2.5, sea="jonswap")
 
@@ -163,3 +165,19 @@ def test_a_saved_flight_keeps_the_weather_of_its_scenario(tmp_path, capsys):
     take = _restored(saved)
     assert len(take.trees) == len(saved.references)
     assert "otherwise" not in capsys.readouterr().err
+
+
+def test_a_page_moves_surface_and_arrows_with_the_flight(tmp_path):
+    env, flight = flown()
+    sea, trace = env.unwrapped.truth["conditions"].sea, flight.trace
+    write_replay(flight, env.unwrapped.simulation, tmp_path / "storm.html", title="Storm")
+    text, timeline = read_page(tmp_path / "storm.html")
+    assert "the moving surface" in text
+    for tick in (0, 10, len(trace.times) - 1):
+        time = trace.times[tick]
+        points = timeline.at(time, "/weather/waves", "points").reshape(-1, 3)
+        np.testing.assert_allclose(points[:, 2], waves.elevation(sea, *points.T[:2], time), atol=0.02)
+        start, end = timeline.at(time, "/weather/wind", "points").reshape(-1, 3)[:2]
+        np.testing.assert_allclose(end - start, WIND_SCALE * trace.weather["wind"][tick], atol=0.01)
+        foot = timeline.at(time, "/plumb", "points").reshape(-1, 3)[1]
+        np.testing.assert_allclose(foot[2], waves.elevation(sea, *trace.states[tick, :2], time), atol=1e-6)
