@@ -1,4 +1,4 @@
-"""Where each objective crosses the surface and how long it is in each medium: a table and a figure.
+"""Where each objective crosses the surface, and how long it is and how far it turns in each medium: tables, a figure.
 
     python -m benchmarks.crossing_points                 # docs/images/crossings.png, 100 worlds of Experiment 1
     python -m benchmarks.crossing_points --worlds 20 --mission air-water
@@ -45,10 +45,12 @@ class Settings:
 
 
 class Crossed(NamedTuple):
-    """One flight: crossing point (m) and seconds in air, zone and water; start and goal (m)."""
+    """One flight: crossing point (m); seconds, and degrees turned, in air, zone and water; start and goal (m)."""
 
     point: np.ndarray
     legs: tuple[float, float, float]
+    turned: tuple[float, float, float]
+    apart: float  # between the first and the last heading, degrees
     start: np.ndarray
     goal: np.ndarray
     energy: float
@@ -56,15 +58,20 @@ class Crossed(NamedTuple):
 
 
 def crossed(flight: Flight, zone: float) -> Crossed:
-    """Take from a flight where it crossed first and how its time is divided."""
+    """Take from a flight where it crossed first and how its time and its turning are divided."""
     states, scenario = flight.trace.states, flight.scenario
     air = float((states[:-1, 2] > zone).mean()) * flight.time
     water = float((states[:-1, 2] < -zone).mean()) * flight.time
+    heading, z = np.unwrap(states[:, 5]), states[:-1, 2]
+    turns = np.degrees(np.abs(np.diff(heading)))
+    turned = float(turns[z > zone].sum()), float(turns[np.abs(z) <= zone].sum()), float(turns[z < -zone].sum())
+    apart = float(np.degrees(abs(heading[-1] - heading[0])))
     passed = int(np.flatnonzero(np.diff(np.sign(states[:, 2])))[0])
     point, start, goal = states[passed, :2], np.array(scenario.start[:2]), np.array(scenario.goal[:2])
     way = goal - start
     share = float((point - start) @ way / (way @ way))
-    return Crossed(point, (air, flight.time - air - water, water), start, goal, flight.energy, share)
+    legs = (air, flight.time - air - water, water)
+    return Crossed(point, legs, turned, apart, start, goal, flight.energy, share)
 
 
 def fly_columns(scenarios: list[Scenario], objective: str) -> list[Crossed]:
@@ -113,6 +120,18 @@ def draw(results: dict[str, list[Crossed]], mission: str) -> Figure:
     return figure
 
 
+def print_turning(results: dict[str, list[Crossed]]) -> None:
+    """Print how far the vehicle turned in each medium and in all, and how far its first and last heading lie apart."""
+    print("\n| objective | turned in air ° | zone ° | water ° | in all ° [5 %, 95 %] | first to last heading ° |")
+    print("|---|---|---|---|---|---|")
+    for objective, flown in results.items():
+        turned, total = np.array([flight.turned for flight in flown]), [sum(flight.turned) for flight in flown]
+        cells = " | ".join(f"{part:.0f}" for part in np.median(turned, axis=0))
+        low, middle, high = np.percentile(total, (5.0, 50.0, 95.0))
+        apart = np.median([flight.apart for flight in flown])
+        print(f"| {objective} | {cells} | {middle:.0f} [{low:.0f}, {high:.0f}] | {apart:.0f} |")
+
+
 def main(a: Settings) -> None:
     """Fly, print the table, save the figure."""
     law = law_of(a.mission, 20)
@@ -127,6 +146,7 @@ def main(a: Settings) -> None:
         share = 100.0 * np.median([flight.progress for flight in flown])
         cells = " | ".join(f"{leg:.1f}" for leg in legs)
         print(f"| {objective} | {len(flown)} | {cells} | {total:.1f} | {energy:.0f} | {share:.0f} |")
+    print_turning(results)
     a.out.parent.mkdir(parents=True, exist_ok=True)
     draw(results, a.mission).savefig(a.out, dpi=style.DOTS_PER_INCH)
     print(a.out)
