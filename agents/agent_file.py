@@ -61,7 +61,7 @@ def save_agent(agent: AgentFile, folder: Path) -> None:
     arrays = {f"weight_{k}": weight for k, weight in enumerate(network.weights)}
     arrays |= {f"bias_{k}": bias for k, bias in enumerate(network.biases)}
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
+    np.savez(buffer, **arrays)
     content = {
         "format": FORMAT,
         "version": VERSION,

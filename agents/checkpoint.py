@@ -117,7 +117,7 @@ def save_buffer(buffer: ReplayBuffer, path: Path) -> None:
     after = buffer.next_observations[:held]
     other = (after != np.roll(buffer.observations[:held], -1, axis=0)).any(axis=-1)  # the buffer is a ring in time
     arrays = {name: getattr(buffer, name)[:held] for name in _PLAIN}
-    np.savez(path, allow_pickle=False, pos=buffer.pos, full=buffer.full, other=other, after=after[other], **arrays)
+    np.savez(path, pos=buffer.pos, full=buffer.full, other=other, after=after[other], **arrays)
 
 
 def load_buffer(buffer: ReplayBuffer, path: Path) -> None:

@@ -221,7 +221,7 @@ def save_suite(suite: Suite, path: str | os.PathLike[str]) -> None:
     described = [{"name": m.name, "env_id": m.env_id, "options": dict(m.options)} for m in suite.missions]
     arrays["suite"] = np.array(json.dumps({"name": suite.name, "missions": described}))
     with open(path, "wb") as stream:
-        np.savez(stream, allow_pickle=False, **arrays)
+        np.savez(stream, **arrays)
 
 
 def _read(path: Path) -> Suite:
