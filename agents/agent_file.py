@@ -58,7 +58,7 @@ def save_agent(agent: AgentFile, folder: Path) -> None:
     """Write an agent to a folder, made if missing; raises OSError when that fails."""
     folder.mkdir(parents=True, exist_ok=True)
     network = agent.network
-    arrays = {f"weight_{k}": weight for k, weight in enumerate(network.weights)}
+    arrays: dict[str, Any] = {f"weight_{k}": weight for k, weight in enumerate(network.weights)}
     arrays |= {f"bias_{k}": bias for k, bias in enumerate(network.biases)}
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)

@@ -210,7 +210,7 @@ def save_suite(suite: Suite, path: str | os.PathLike[str]) -> None:
     Raises ValueError where scenarios of one mission have different numbers of spheres, or weather of their own, and
     OSError if writing fails.
     """
-    arrays: dict[str, NDArray] = {}
+    arrays: dict[str, Any] = {}
     for mission in suite.missions:
         if len({len(scenario.obstacles) for scenario in mission.scenarios}) > 1:
             raise ValueError(f"scenarios of mission {mission.name!r} must have equally many spheres to be saved")
