@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hydrone_gym.weather.weather import LEVELS
 from hydrone_gym.world.scenario import Scenario, load_scenario
