@@ -23,7 +23,6 @@ from hydrone_gym.perception.perceived import Perceived, perceive
 from hydrone_gym.rendering.view import new_screen
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.simulation import STILL, Simulation
-from hydrone_gym.vehicle import named_vehicle
 from hydrone_gym.world.bodies import NOWHERE
 from hydrone_gym.world.generator import draw, first_numbers, place_many, prepare
 from hydrone_gym.world.scenario import Scenario
@@ -58,7 +57,7 @@ class EpisodeBatch:
     ) -> None:
         """Make the storage."""
         self.options, self.count, self.lanes, self.draws = options, count, lanes, options.draws
-        vehicle, world, self._obstacles = named_vehicle(options.vehicle), options.world, options.num_obstacles
+        vehicle, world, self._obstacles = options.the_vehicle, options.world, options.num_obstacles
         parts = range(max(1, min(threads, count // _ROWS_A_THREAD)))
         self.simulations = [Simulation(vehicle, world, options.period, lanes, options.controller) for _ in parts]
         simulation = self.simulations[0]

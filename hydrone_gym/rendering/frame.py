@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 from hydrone_gym.rendering import shapes, style
 from hydrone_gym.rendering.backdrop import Box
 from hydrone_gym.rendering.camera import Pose, View, beside, chase
+from hydrone_gym.rendering.outdoors import Outdoors
 from hydrone_gym.rendering.raycast import Canvas
 from hydrone_gym.rendering.track import Moment
 from hydrone_gym.simulation.outcome import Outcome
@@ -36,9 +37,10 @@ class Painter:
         unit = self._unit(pose, moment.ticks[-1, :3] if self._following else np.zeros(3))
         widest = _VEHICLE_PIXELS * unit / (2.0 * self.vehicle.radius)
         scale = 1.0 if self._following else max(_OVERVIEW_SCALE, widest)
-        image = self._canvas.picture(self._shapes(moment, pose, unit, scale), pose, box)
-        ground = {Outcome.RUNNING: _GROUND, Outcome.GOAL: _GOOD}.get(moment.outcome, _BAD)
         outdoors = moment.outdoors(self.world)
+        drawn = self._shapes(moment, outdoors, pose, unit, scale)
+        image = self._canvas.picture(drawn, pose, box)
+        ground = {Outcome.RUNNING: _GROUND, Outcome.GOAL: _GOOD}.get(moment.outcome, _BAD)
         words = moment.words(self.world.zone) + (() if outdoors is None else (outdoors.words,))
         _write(image, "   ".join(words), ground)
         return image
@@ -53,11 +55,12 @@ class Painter:
         """How much a pixel covers at a point (m): thin things are measured in it, to stay visible in any picture."""
         return pose.pixel(self.view.size[1]) * float(np.linalg.norm(point - pose.eye))
 
-    def _shapes(self, moment: Moment, pose: Pose, unit: float, scale: float) -> shapes.Shapes:
+    def _shapes(
+        self, moment: Moment, outdoors: Outdoors | None, pose: Pose, unit: float, scale: float
+    ) -> shapes.Shapes:
         """Everything that is drawn; `unit` (m) is a pixel at the path."""
         now = moment.ticks[-1]
         end, sent = (self._unit(pose, point) for point in (moment.goal, now[12:15]))
-        outdoors = moment.outdoors(self.world)
         veiled = gaps_along(pose.eye, now[:3], moment.obstacles) < self.vehicle.radius  # they would hide the vehicle
         parts = (
             shapes.obstacles(moment.obstacles, moment.detected, veiled & self._following),

@@ -213,7 +213,7 @@ def conditions_of(conditions: NDArray[np.float64], lanes: int, row: int) -> Cond
 
 @kernel
 def begin_conditions(conditions, lanes, rows, order, streams, climates, which):
-    """Draw the conditions of episodes that begin, or go on from where they are.
+    """Draw the conditions of episodes that begin.
 
     Args:
         conditions: (blocks, CONDITIONS * lanes), updated.
