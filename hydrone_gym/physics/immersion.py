@@ -111,6 +111,22 @@ def unmodelled_of(hull, dt):
 
 
 @inlined
+def water_at(fluid, after):
+    """Return the water's velocity (x, y, z in m/s) so many seconds from the middle of the tick."""
+    return (
+        fluid.water_x + after * fluid.water_rate_x,
+        fluid.water_y + after * fluid.water_rate_y,
+        fluid.water_z + after * fluid.water_rate_z,
+    )
+
+
+@inlined
+def elevation_at(fluid, after):
+    """Return the surface's elevation (m) so many seconds from the middle of the tick."""
+    return fluid.elevation + after * fluid.elevation_rate
+
+
+@inlined
 def submerged_share(height, inverse_height):
     """Return the share of a hull that is under water when its middle is a height (m) above the water."""
     share = 0.5 - height * inverse_height
@@ -251,12 +267,8 @@ def immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after, 
         fluid.air_y + later * fluid.air_rate_y,
         fluid.air_z + later * fluid.air_rate_z,
     )
-    water = (
-        fluid.water_x + later * fluid.water_rate_x,
-        fluid.water_y + later * fluid.water_rate_y,
-        fluid.water_z + later * fluid.water_rate_z,
-    )
-    height = state.z - (fluid.elevation + after * fluid.elevation_rate)
+    water = water_at(fluid, later)
+    height = state.z - elevation_at(fluid, after)
     share = submerged_share(height, real.inverse_height)
     mass_share, dense = shares_of(share, real)
     medium = blended(vehicle, driven, share, mass_share)

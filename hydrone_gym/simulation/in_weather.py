@@ -2,7 +2,16 @@
 
 from hydrone_gym._jit import inlined
 from hydrone_gym._memory import gather, offsets_of, scatter, select, zero_like
-from hydrone_gym.physics.immersion import Fluid, Rotors, Unmodelled, immersed_step, lagged, near_water_factor
+from hydrone_gym.physics.immersion import (
+    Fluid,
+    Rotors,
+    Unmodelled,
+    elevation_at,
+    immersed_step,
+    lagged,
+    near_water_factor,
+    water_at,
+)
 from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.parameters import VehicleParams
 from hydrone_gym.physics.rotors import shaft_power
@@ -120,13 +129,8 @@ def weathered_step(memory, i, lanes, now, wanted, sub):
     speeds = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
     after = sub * DT - 0.5 * TICK  # the end of this step, from the middle of the tick
     new, medium = immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after - DT, DT)
-    air = is_air(new.z - (fluid.elevation + after * fluid.elevation_rate))
+    air, water = is_air(new.z - elevation_at(fluid, after)), water_at(fluid, after)
     crossed = air != (noticed.air > 0.0)
-    water = (
-        fluid.water_x + after * fluid.water_rate_x,
-        fluid.water_y + after * fluid.water_rate_y,
-        fluid.water_z + after * fluid.water_rate_z,
-    )
     relative = (new.vx - water[0], new.vy - water[1], new.vz - water[2])
     waited = noticed.waited + DT if air != driven else 0.0
     turned = waited > real.medium_delay
