@@ -66,6 +66,7 @@ class AirGains:
     vertical_speed_limit: float = _number(1.5, "m/s")
     zone_speed_limit: float = _number(0.5, "m/s")
     zone_lateral_speed: float = _number(0.05, "m/s")
+    pre_spin: float = _number(0.0, "m", "not negative")
 
     def __post_init__(self) -> None:
         """Check every gain."""
@@ -101,6 +102,51 @@ class WaterGains:
                 "WaterGains.surge_misalignment must not be positive (N/rad^2): the vehicle would speed up while "
                 f"misaligned and orbit the reference; got {self.surge_misalignment!r}"
             )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustGains:
+    """Gains and limits of the second law, `controller="robust"`: accelerations where the paper has rotor speeds."""
+
+    observer_time: float = _number(0.4, "s")
+    disturbance_limit: float = _number(4.0, "m/s^2", "not negative")
+    position_p: float = _number(2.5, "1/s")
+    velocity_p: float = _number(4.0, "1/s")
+    braking: float = _number(4.5, "m/s^2")
+    tilt_limit: float = _number(math.radians(35.0), "rad")
+    speed_limit: float = _number(2.86, "m/s")
+    height_p: float = _number(3.0, "1/s")
+    height_d: float = _number(5.0, "1/s")
+    height_braking: float = _number(4.0, "m/s^2")
+    climb_limit: float = _number(2.5, "m/s")
+    descent_limit: float = _number(2.0, "m/s")
+    attitude_rate: float = _number(14.0, "rad/s")
+    attitude_damping: float = _number(0.9, "1")
+    yaw_rate: float = _number(3.0, "rad/s")
+    yaw_limit: float = _number(0.6, "rad")
+    zone_speed_limit: float = _number(0.8, "m/s")
+    zone_braking: float = _number(2.0, "m/s^2")
+    crossing_share: float = _number(0.8, "1")
+    pre_spin: float = _number(0.15, "m", "not negative")
+    depth_p: float = _number(2.0, "1/s")
+    depth_d: float = _number(6.0, "1/s")
+    depth_braking: float = _number(1.0, "m/s^2")
+    dive_limit: float = _number(0.55, "m/s")
+    rise_limit: float = _number(0.65, "m/s")
+    level_p: float = _number(30.0, "1/s^2", "not negative")
+    level_d: float = _number(10.0, "1/s", "not negative")
+    surge_p: float = _number(1.5, "1/s")
+    surge_d: float = _number(4.0, "1/s")
+    surge_braking: float = _number(1.0, "m/s^2")
+    surge_limit: float = _number(1.2, "m/s")
+    hold_radius: float = _number(0.3, "m", "not negative")
+    heading_p: float = _number(2.0, "1/s")
+    heading_d: float = _number(6.0, "1/s")
+    turn_limit: float = _number(1.0, "rad/s")
+
+    def __post_init__(self) -> None:
+        """Check every gain."""
+        _check_numbers(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +193,7 @@ class Vehicle:
     medium_delay: float = _number(0.0, "s", "not negative")
     air_gains: AirGains = field(default_factory=AirGains)
     water_gains: WaterGains = field(default_factory=WaterGains)
+    robust_gains: RobustGains = field(default_factory=RobustGains)
 
     def __post_init__(self) -> None:
         """Check every field, that the vehicle floats, and that its rotors can hold it in both media."""

@@ -5,6 +5,8 @@ A law publishes its `Envelope`; time-to-go, spaces, objectives and planners read
 
 from typing import NamedTuple
 
+from hydrone_gym.physics.parameters import MediumParams
+
 
 class Envelope(NamedTuple):
     """The limits of a vehicle under its control law."""
@@ -22,3 +24,8 @@ class Envelope(NamedTuple):
     swim_power: float  # shaft power of swimming at surge speed while holding depth, W
     height_memory: float  # greatest magnitude of the controller's memory for height: rpm in air, N in water
     attitude_memory: float  # of each of its other three entries
+
+
+def shaft_power_at(medium: MediumParams, speed: float, rotors: int) -> float:
+    """Shaft power (W) of rotors at one speed (rpm)."""
+    return rotors * medium.power * abs(speed) ** 3

@@ -29,12 +29,19 @@ class _Kernels(NamedTuple):
 
     act: Callable
     tracks: Callable
+    pre_spin: Callable
 
 
 _KERNELS: dict[type, _Kernels] = {}
 
 
-def register(gains: type, act: Callable, tracks: Callable) -> None:
+@inlined
+def no_pre_spin(gains):
+    """Rotors start when their medium is noticed."""
+    return 0.0
+
+
+def register(gains: type, act: Callable, tracks: Callable, pre_spin: Callable = no_pre_spin) -> None:
     """Register the kernels of a law under the class of its gains.
 
     Args:
@@ -43,8 +50,10 @@ def register(gains: type, act: Callable, tracks: Callable) -> None:
             gains, and the time step in s; returns four unsaturated rotor speeds (rpm) and the new `Integral`.
         tracks: called as ``tracks(now, gains)``; returns the roll, pitch and yaw (rad) that the law steers to, NaN for
             what it does not. For pictures only.
+        pre_spin: called as ``pre_spin(gains)``; returns the depth (m) above which the aerial rotors of a rising vehicle
+            turn already at hover speed, 0 for not at all. Without it they do not.
     """
-    _KERNELS[gains] = _Kernels(act, tracks)
+    _KERNELS[gains] = _Kernels(act, tracks, pre_spin)
 
 
 def _act(gains, now, integral, model, dt):
@@ -73,6 +82,20 @@ def _tracked_of(gains, now):
         return tracks(now, gains)
 
     return tracked_by_law
+
+
+def pre_spin(gains):
+    """Depth (m) above which a law has the aerial rotors of a rising vehicle turn; for kernels."""
+
+
+@overload(pre_spin, jit_options={"forceinline": True, "error_model": "numpy"})
+def _pre_spin_of(gains):
+    depth = _KERNELS[gains.instance_class].pre_spin
+
+    def pre_spin_of_law(gains):
+        return depth(gains)
+
+    return pre_spin_of_law
 
 
 @inlined

@@ -1,11 +1,11 @@
 """The control laws there are. A new one is a file beside `paper.py` and its entry here."""
 
-from hydrone_gym.control import paper
+from hydrone_gym.control import paper, robust
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.control.law import Law
 from hydrone_gym.vehicle import Vehicle
 
-LAWS: dict[str, Law] = {law.name: law for law in (paper.LAW,)}
+LAWS: dict[str, Law] = {law.name: law for law in (paper.LAW, robust.LAW)}
 
 
 def named_law(name: str, option: str = "law") -> Law:

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hydrone_gym._jit import inlined
-from hydrone_gym.control.envelope import Envelope
+from hydrone_gym.control.envelope import Envelope, shaft_power_at
 from hydrone_gym.control.law import Law, register
 from hydrone_gym.control.reference import Integral, accumulate, clamp
-from hydrone_gym.physics.parameters import MediumParams, vehicle_params
+from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.vehicle import AirGains, Vehicle, WaterGains
 
@@ -185,6 +185,12 @@ def attitude_reference(now, gains):
     return np.nan, 0.0, now.state.psi + error if drive else np.nan
 
 
+@inlined
+def pre_spin_of(gains):
+    """Depth (m) above which the aerial rotors of a rising vehicle turn already."""
+    return gains.air.pre_spin
+
+
 def _envelope_of(vehicle: Vehicle) -> Envelope:
     """Work out the limits of a vehicle under this law."""
     air, water, params = vehicle.air_gains, vehicle.water_gains, vehicle_params(vehicle)
@@ -199,17 +205,12 @@ def _envelope_of(vehicle: Vehicle) -> Envelope:
         ahead_air=0.2,
         ahead_water=0.1,
         hold_radius=water.hold_radius,
-        flight_power=_power(params.air, vehicle.hover_speed, 4),
-        swim_power=_power(params.water, swimming, 2) + _power(params.water, vehicle.neutral_speed, 2),
+        flight_power=shaft_power_at(params.air, vehicle.hover_speed, 4),
+        swim_power=shaft_power_at(params.water, swimming, 2) + shaft_power_at(params.water, vehicle.neutral_speed, 2),
         height_memory=max(air.altitude_i_limit, water.depth_i_limit),
         attitude_memory=max(air.attitude_i_limit, water.attitude_i_limit),
     )
 
 
-def _power(medium: MediumParams, speed: float, rotors: int) -> float:
-    """Shaft power (W) of rotors at one speed (rpm)."""
-    return rotors * medium.power * abs(speed) ** 3
-
-
-register(PaperGains, paper_control, attitude_reference)
+register(PaperGains, paper_control, attitude_reference, pre_spin_of)
 LAW = Law("paper", PaperGains, _gains_of, _envelope_of)

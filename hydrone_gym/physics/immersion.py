@@ -25,7 +25,7 @@ from hydrone_gym._jit import inlined, shared
 from hydrone_gym.physics.dynamics import BodyAcceleration, acceleration, integrate
 from hydrone_gym.physics.kinematics import to_body
 from hydrone_gym.physics.parameters import MediumParams
-from hydrone_gym.physics.rotors import rotor_wrench
+from hydrone_gym.physics.rotors import Wrench, rotor_wrench
 from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import AIR_DENSITY, WATER_DENSITY
 
@@ -251,7 +251,7 @@ def immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after, 
 
     Args:
         state, attitude: of the vehicle.
-        speeds: mean rotor speeds over the step, rpm.
+        speeds: mean rotor speeds over the step, rpm; a fifth is that of all aerial rotors where others are driven.
         vehicle, real: `VehicleParams` and `Unmodelled` of the vehicle as it is.
         fluid: `Fluid`.
         driven: whether the aerial rotors are driven.
@@ -275,6 +275,8 @@ def immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after, 
     thrusts, turning = _rotors(attitude, speeds, height, share, vehicle, real, fluid, driven)
     fx, fy, fz = _water_force(state, fluid, water, share, real)
     wrench = rotor_wrench(vehicle, driven, thrusts)
+    beside = 4.0 * vehicle.air.thrust * speeds[4] * speeds[4] * (1.0 - share)
+    wrench = Wrench(wrench.fx, wrench.fz + beside, wrench.mx, wrench.my, wrench.mz)
     a = acceleration(state, attitude, wrench, (fx, fy, fz - medium.weight), vehicle, medium)
     around = to_body(
         attitude,

@@ -13,7 +13,7 @@ from numba import types
 
 from hydrone_gym._jit import inlined, unit
 from hydrone_gym._memory import gather, scatter, select, zero_like
-from hydrone_gym.control.law import control
+from hydrone_gym.control.law import control, pre_spin
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.control.reference import Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
@@ -89,7 +89,7 @@ def substep(b, i, lanes, part, inverses, model, weather):
         noticed = air != is_air(new.z)
         note_crossing(b, i, lanes, noticed, is_air(new.z), (new.vx, new.vy, new.vz), attitude)
     else:
-        new, power, noticed, crossing = weathered_step(weather, i, lanes, now, speeds, part[1])
+        new, power, noticed, crossing = weathered_step(weather, i, lanes, now, speeds, part[1], pre_spin(model.gains))
         note_crossing(b, i, lanes, crossing[0], crossing[1], crossing[2], attitude)
     scatter(b, ENERGY, i, lanes, gather(b, ENERGY, i, lanes, float) + power * DT)
     scatter(b, FLOWN_AT.integral, i, lanes, select(noticed, zero_like(integral), integral))

@@ -55,6 +55,7 @@ class Noticed(NamedTuple):
     air: float
     driven: float
     waited: float  # s that they have differed
+    spun: float  # rpm of the aerial rotors that turn beside the aquatic ones, before a water exit
 
 
 class Chances(NamedTuple):
@@ -171,7 +172,7 @@ def _begin(memory, i, lanes, row, numbers, key):
     flow = currents.velocity(eddies, climate.current, headings.current)
     scatter(memory, AT.fluid, i, lanes, fluid_of(wind, wind, flow, flow, swell, 1.0))
     air = 1.0 if is_air(place[2] - swell.elevation) else 0.0
-    scatter(memory, AT.noticed, i, lanes, Noticed(air, air, 0.0))
+    scatter(memory, AT.noticed, i, lanes, Noticed(air, air, 0.0, 0.0))
     # its rotors hold it already: four in air, the two that lift in water
     lifting = vehicle.hover_speed if air > 0.0 else -np.sqrt(abs(vehicle.water.weight) / (2.0 * vehicle.water.thrust))
     driving = lifting if air > 0.0 else 0.0

@@ -114,9 +114,10 @@ def takes_for_air(memory, i, lanes):
 
 
 @inlined
-def weathered_step(memory, i, lanes, now, wanted, sub):
+def weathered_step(memory, i, lanes, now, wanted, sub, spin_depth):
     """Advance lane i as the vehicle really is, in its weather; `sub` counts the tick's physics steps at its end.
 
+    While it rises above `spin_depth` (m), the aerial rotors of a vehicle that is driven in water turn too.
     Returns the new state, the rotors' shaft power (W), whether the controller now notices another medium, and the
     crossing: whether there is one, whether into air, and the velocity relative to the water (x, y, z in m/s).
     """
@@ -126,8 +127,12 @@ def weathered_step(memory, i, lanes, now, wanted, sub):
     rotors = gather(memory, AT.rotors, i, lanes, Rotors)
     fluid = gather(memory, AT.fluid, i, lanes, Fluid)
     noticed = gather(memory, AT.noticed, i, lanes, Noticed)
-    speeds = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
     after = sub * DT - 0.5 * TICK  # the end of this step, from the middle of the tick
+    rising = not driven and state.vz > 0.0 and state.z - elevation_at(fluid, after - DT) > -spin_depth
+    idle = vehicle.hover_speed if rising else 0.0
+    spun = idle + (noticed.spun - idle) * real.keep_air
+    s1, s2, s3, s4 = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
+    speeds = s1, s2, s3, s4, spun
     new, medium = immersed_step(state, attitude, speeds, vehicle, real, fluid, driven, after - DT, DT)
     air, water = is_air(new.z - elevation_at(fluid, after)), water_at(fluid, after)
     crossed = air != (noticed.air > 0.0)
@@ -140,9 +145,10 @@ def weathered_step(memory, i, lanes, now, wanted, sub):
         AT.noticed,
         i,
         lanes,
-        Noticed(1.0 if air else 0.0, 1.0 if driven_now else 0.0, 0.0 if turned else waited),
+        Noticed(1.0 if air else 0.0, 1.0 if driven_now else 0.0, 0.0 if turned else waited, 0.0 if turned else spun),
     )
-    # the rotors of the other medium start from rest
+    # the rotors of the other medium start from rest, or from what they were brought to before
     later = lagged(rotors, wanted, real.keep_air if driven else real.keep_water)
-    scatter(memory, AT.rotors, i, lanes, select(turned, zero_like(later), later))
-    return new, shaft_power(medium, speeds), turned, (crossed, air, relative)
+    scatter(memory, AT.rotors, i, lanes, select(turned, Rotors(spun, spun, spun, spun), later))
+    power = shaft_power(medium, speeds) + 4.0 * vehicle.air.power * spun * spun * spun
+    return new, power, turned, (crossed, air, relative)

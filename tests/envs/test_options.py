@@ -102,8 +102,8 @@ def test_the_controller_flies_every_row_and_is_believed(interface, monkeypatch):
 
 
 def test_an_unknown_controller_lists_the_known_ones():
-    with pytest.raises(ValueError, match=r"must be one of 'paper'.*, got 'robust'"):
-        Options(controller="robust")
+    with pytest.raises(ValueError, match=r"must be one of 'paper', 'robust'.*, got 'best'"):
+        Options(controller="best")
 
 
 def test_the_greatest_number_of_obstacles_is_accepted():

@@ -14,7 +14,7 @@ STILL = Fluid(*[0.0] * 14, near_water=1.0)
 @kernel
 def _steps(values, rotor_speed, vehicle, real, fluid, driven, dt, path):
     state = State(*to_fixed_tuple(values, 12))
-    speeds = to_fixed_tuple(rotor_speed, 4)
+    speeds = (*to_fixed_tuple(rotor_speed, 4), 0.0)
     for k in range(len(path)):
         state, _ = immersed_step(state, attitude_of(state), speeds, vehicle, real, fluid, driven, 0.0, dt)
         for i, value in enumerate(state):
