@@ -28,6 +28,16 @@ class Integral(NamedTuple):
     psi: float
 
 
+class Surface(NamedTuple):
+    """The water's surface below or above a vehicle, as its controller perceives it."""
+
+    elevation: float  # above its mean, m
+    vx: float  # velocity of the water, m/s
+    vy: float
+    ax: float  # and its acceleration, m/s^2
+    ay: float
+
+
 class Instant(NamedTuple):
     """Everything a law looks at."""
 
@@ -38,6 +48,7 @@ class Instant(NamedTuple):
     vertical: bool  # whether the vehicle has to hold still laterally, in the transition zone
     air: bool
     medium: MediumParams
+    surface: Surface
 
 
 @inlined

@@ -32,6 +32,7 @@ from hydrone_gym.vehicle import RobustGains, Vehicle
 RobustGainParams = namedtuple("RobustGainParams", [spec.name for spec in fields(RobustGains)])  # type: ignore[misc]
 _LEAST_LIFT = 3.0  # m/s^2 of upward thrust that tilt is reckoned with, whatever the vehicle falls with
 _HOVER_BAND = 0.15  # m above the surface in which a vehicle waits that is too fast to cross
+_FORESEEN = 0.25  # s for which waves go on as they do
 _TILT_BAND = 0.65  # m above that over which tilt is given back
 _STILL = 0.06  # m/s through the water that is not worth a turn
 _ASTRAY = 0.6  # rad off course at which a vehicle under water only turns
@@ -84,8 +85,11 @@ def predict(now, disturbance, speeds, model, dt):
 
 
 @inlined
-def steer(now, gains, limit):
-    """Return the wanted lateral acceleration (m/s^2, world) that tracks the reference at most at a speed (m/s)."""
+def steer(now, gains, flow, limit):
+    """Return the wanted lateral acceleration (m/s^2, world) that tracks the reference, at most at a speed (m/s).
+
+    `flow` is what the limit is reckoned from: a velocity (x, y in m/s) and its rate.
+    """
     state, reference = now.state, now.reference
     ex, ey = reference.x - state.x, reference.y - state.y
     distance = np.sqrt(ex * ex + ey * ey)
@@ -93,33 +97,62 @@ def steer(now, gains, limit):
     ux, uy = inverse * ex, inverse * ey
     speed, slope = profile(distance, gains.position_p, gains.braking)
     wx, wy = reference.vx + speed * ux, reference.vy + speed * uy
-    vx, vy = shorten(wx, wy, limit)
+    flow_x, flow_y, rate_x, rate_y = flow
+    rx, ry = wx - flow_x, wy - flow_y
+    vx, vy = shorten(rx, ry, limit)
+    vx, vy = vx + flow_x, vy + flow_y
     closing = (state.vx - reference.vx) * ux + (state.vy - reference.vy) * uy
-    slowing = slope * closing if closing > 0.0 and wx * wx + wy * wy <= limit * limit else 0.0
+    free = rx * rx + ry * ry <= limit * limit
+    slowing = slope * closing if closing > 0.0 and free else 0.0
     p = gains.velocity_p
-    return p * (vx - state.vx) - slowing * ux, p * (vy - state.vy) - slowing * uy
+    return p * (vx - state.vx) - slowing * ux + rate_x, p * (vy - state.vy) - slowing * uy + rate_y
 
 
 @inlined
-def surface_limits(now, gains, world):
+def flow_near(now, world):
+    """Velocity and acceleration of the water (x, y in m/s and m/s^2) for a vehicle in the transition zone, else zero."""
+    water, near = now.surface, abs(now.state.z) <= world.zone
+    return (
+        water.vx if near else 0.0,
+        water.vy if near else 0.0,
+        water.ax if near else 0.0,
+        water.ay if near else 0.0,
+    )
+
+
+@inlined
+def way_left(now, gains):
+    """Return how far (m) a vehicle is from where it waits for the surface, and how many seconds it needs there."""
+    height = max(abs(now.state.z - now.surface.elevation) - _HOVER_BAND, 0.0)
+    return height, height / max(abs(now.state.vz), 0.5 * gains.zone_speed_limit)
+
+
+@inlined
+def too_fast(now, gains, flow, seconds, world):
+    """Return by how much (m/s) the lateral speed through the water will exceed that of a smooth crossing."""
+    soon = min(seconds + _HOVER_BAND / gains.zone_speed_limit, _FORESEEN)
+    vx, vy = now.state.vx - flow[0] - soon * flow[2], now.state.vy - flow[1] - soon * flow[3]
+    return np.sqrt(vx * vx + vy * vy) - gains.crossing_share * world.rough_speed
+
+
+@inlined
+def surface_limits(now, gains, flow, world):
     """Return limits above the water: lateral speed (m/s), descent (m/s), and tangent of the tilt.
 
     Nobody reaches the surface faster than the crossing may be, sideways or downwards: who is too fast comes down as
     fast as braking takes, and waits above the water for the rest.
     """
     state = now.state
-    height = max(state.z - _HOVER_BAND, 0.0)
+    height, seconds = way_left(now, gains)
+    excess = too_fast(now, gains, flow, seconds, world)
     smooth = gains.crossing_share * world.rough_speed
-    lateral = np.sqrt(state.vx * state.vx + state.vy * state.vy)
-    excess = lateral - smooth
     fastest = np.sqrt(gains.zone_speed_limit * gains.zone_speed_limit + 2.0 * gains.zone_braking * height)
     descent = min(fastest, gains.descent_limit)
     descent = min(descent, height * gains.zone_braking / excess) if excess > 0.0 else descent
     crosses = now.reference.z <= 0.0
-    seconds = height / max(-state.vz, 0.5 * gains.zone_speed_limit)
     limit = min(gains.speed_limit, smooth + gains.zone_braking * seconds) if crosses else gains.speed_limit
     cosine = world.rough_cos_tilt
-    level = gains.crossing_share * np.sqrt(1.0 - cosine * cosine) / cosine
+    level = gains.level_share * np.sqrt(1.0 - cosine * cosine) / cosine
     share = clamp(height / _TILT_BAND, 0.0, 1.0)
     return 0.0 if now.vertical else limit, descent, level + (gains.tilt_limit - level) * share
 
@@ -153,18 +186,19 @@ def _speed(force, scale, medium):
 def tilt_wanted(now, disturbance, model):
     """Return the wanted roll and pitch (rad), and the thrust upwards (m/s^2)."""
     gains, state, attitude, reference = model.gains, now.state, now.attitude, now.reference
-    limit, descent, tangent = surface_limits(now, gains, model.world)
+    flow = flow_near(now, model.world)
+    limit, descent, tangent = surface_limits(now, gains, flow, model.world)
     error = reference.z - state.z
     speed, slope = profile(abs(error), gains.height_p, gains.height_braking)
     wanted = reference.vz + (speed if error > 0.0 else -speed)
     climb = clamp(wanted, -descent, gains.climb_limit)
     slowing = -slope * (state.vz - reference.vz) if wanted == climb else 0.0
     slowing = (
-        gains.zone_braking if wanted < -descent and state.z > _HOVER_BAND and descent < gains.descent_limit else slowing
+        gains.zone_braking if wanted < -descent and state.z - now.surface.elevation > _HOVER_BAND and descent < gains.descent_limit else slowing
     )
     up = clamp(gains.height_d * (climb - state.vz) + slowing, -gains.height_braking, gains.height_braking)
     up = max(up - disturbance.z + now.medium.weight * now.medium.inverse_mass, _LEAST_LIFT)
-    ax, ay = steer(now, gains, limit)
+    ax, ay = steer(now, gains, flow, limit)
     ax, ay = shorten(ax - disturbance.x, ay - disturbance.y, up * tangent)
     ahead = ax * attitude.c_psi + ay * attitude.s_psi
     aside = ay * attitude.c_psi - ax * attitude.s_psi
@@ -227,7 +261,10 @@ def water_control(now, disturbance, model):
     gains, state, medium, attitude = model.gains, now.state, now.medium, now.attitude
     error = now.reference.z - state.z
     speed, _ = profile(abs(error), gains.depth_p, gains.depth_braking)
-    climb = clamp(now.reference.vz + (speed if error > 0.0 else -speed), -gains.dive_limit, gains.rise_limit)
+    below, seconds = way_left(now, gains)
+    excess = too_fast(now, gains, flow_near(now, model.world), seconds, model.world)
+    rise = min(gains.rise_limit, below * gains.zone_braking / excess) if excess > 0.0 else gains.rise_limit
+    climb = clamp(now.reference.vz + (speed if error > 0.0 else -speed), -gains.dive_limit, rise)
     upwards = gains.depth_d * (climb - state.vz) - disturbance.z + medium.drag_z * abs(climb) * climb
     lift = (upwards / medium.inverse_mass + medium.weight) / (attitude.c_phi * attitude.c_theta)
     level = -(gains.level_p * state.theta + gains.level_d * now.rates[1]) / medium.inverse_inertia_y

@@ -2,6 +2,7 @@
 
 from hydrone_gym._jit import inlined
 from hydrone_gym._memory import gather, offsets_of, scatter, select, zero_like
+from hydrone_gym.control.reference import Surface
 from hydrone_gym.physics.immersion import (
     Fluid,
     Rotors,
@@ -111,6 +112,15 @@ def _sum(a, b):
 def takes_for_air(memory, i, lanes):
     """Whether lane i's controller takes it to be in air."""
     return gather(memory, DRIVEN, i, lanes, float) > 0.0
+
+
+@inlined
+def surface_below(memory, i, lanes, sub):
+    """Return the `Surface` at lane i's place when a physics step begins; `sub` counts the tick's at its end."""
+    fluid = gather(memory, AT.fluid, i, lanes, Fluid)
+    after = (sub - 1) * DT - 0.5 * TICK
+    water = water_at(fluid, after)
+    return Surface(elevation_at(fluid, after), water[0], water[1], fluid.water_rate_x, fluid.water_rate_y)
 
 
 @inlined
