@@ -38,6 +38,9 @@ class Surface(NamedTuple):
     ay: float
 
 
+FLAT = Surface(0.0, 0.0, 0.0, 0.0, 0.0)  # water at rest
+
+
 class Instant(NamedTuple):
     """Everything a law looks at."""
 

@@ -194,7 +194,9 @@ def tilt_wanted(now, disturbance, model):
     climb = clamp(wanted, -descent, gains.climb_limit)
     slowing = -slope * (state.vz - reference.vz) if wanted == climb else 0.0
     slowing = (
-        gains.zone_braking if wanted < -descent and state.z - now.surface.elevation > _HOVER_BAND and descent < gains.descent_limit else slowing
+        gains.zone_braking
+        if wanted < -descent and state.z - now.surface.elevation > _HOVER_BAND and descent < gains.descent_limit
+        else slowing
     )
     up = clamp(gains.height_d * (climb - state.vz) + slowing, -gains.height_braking, gains.height_braking)
     up = max(up - disturbance.z + now.medium.weight * now.medium.inverse_mass, _LEAST_LIFT)

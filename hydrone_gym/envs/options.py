@@ -20,7 +20,7 @@ from hydrone_gym.simulation.simulation import ticks_in
 from hydrone_gym.vehicle import Vehicle, named_vehicle
 from hydrone_gym.weather import Spread, Weather, named_weather
 from hydrone_gym.world.generator import EXPERIMENT_1, EXPERIMENT_2, ScenarioLaw, prepare
-from hydrone_gym.world.world import World
+from hydrone_gym.world.world import CROSSINGS, World
 
 SCENARIO_LAWS = {"air_to_water": EXPERIMENT_1, "water_to_air": EXPERIMENT_2, "random": ScenarioLaw()}
 INTERFACES = ("world", "egocentric")
@@ -60,6 +60,11 @@ class Options:
     controller: str = _option("paper", "name of the control law, one of `hydrone_gym.control.laws`")
     period: float = _option(0.5, "seconds a step, a multiple of 0.05")
     vertical_mode: bool = _option(True, "hold still laterally inside the transition zone")
+    crossing: str = _option(
+        "vertical",
+        '"vertical" is the paper\'s; "adaptive" moves laterally in the transition zone too and is as smooth at the '
+        'surface, as with `vertical_mode=False`; "aggressive" may cross it at 1 m/s and 15 degrees of tilt',
+    )
     rough_transition: str = _option("fail", '"fail" ends an episode at a rough crossing, "count" only notes it')
     time_limit: float = _option(120.0, "s")
     interface: str = _option(
@@ -78,6 +83,7 @@ class Options:
         vehicle = named_vehicle(self.vehicle)
         named_law(self.controller, "controller")
         known = {"mission": tuple(SCENARIO_LAWS), "interface": INTERFACES, "rough_transition": ("fail", "count")}
+        known["crossing"] = tuple(CROSSINGS)
         for name, choices in known.items():
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {getattr(self, name)!r}")
@@ -106,8 +112,8 @@ class Options:
     @property
     def world(self) -> World:
         """The world the environment flies in."""
-        sensor_range, vertical_mode = float(self.sensor_range), self.vertical_mode
-        return World(sensor_range=sensor_range, vertical_mode=vertical_mode, rough_transition=self.rough_transition)
+        rules: dict[str, Any] = {"vertical_mode": self.vertical_mode, **CROSSINGS[self.crossing]}
+        return World(sensor_range=float(self.sensor_range), rough_transition=self.rough_transition, **rules)
 
     @property
     def draws(self) -> ScenarioLaw:

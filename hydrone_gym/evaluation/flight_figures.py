@@ -10,7 +10,7 @@ from hydrone_gym._jit import kernel
 from hydrone_gym._memory import gather
 from hydrone_gym.control.law import tracked
 from hydrone_gym.control.laws import named_law
-from hydrone_gym.control.reference import Instant, Reference
+from hydrone_gym.control.reference import FLAT, Instant, Reference
 from hydrone_gym.evaluation.flight import Flight, Trace
 from hydrone_gym.physics.dynamics import medium_at
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
@@ -38,7 +38,7 @@ def _write_references(
         attitude, air = attitude_of(state), airs[n]
         rates = euler_rates(attitude, state.p, state.q, state.r)
         vertical = abs(state.z) <= world.zone and world.vertical_mode > 0.0
-        now = Instant(state, attitude, rates, reference, vertical, air, medium_at(vehicle, air))
+        now = Instant(state, attitude, rates, reference, vertical, air, medium_at(vehicle, air), FLAT)
         out[n, 0], out[n, 1], out[n, 2] = tracked(gains, now)
 
 

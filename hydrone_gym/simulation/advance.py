@@ -15,7 +15,7 @@ from hydrone_gym._jit import inlined, unit
 from hydrone_gym._memory import gather, scatter, select, zero_like
 from hydrone_gym.control.law import control, pre_spin
 from hydrone_gym.control.laws import named_law
-from hydrone_gym.control.reference import Instant, Integral, Reference, Surface
+from hydrone_gym.control.reference import FLAT, Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
 from hydrone_gym.physics.rotors import shaft_power
@@ -81,7 +81,7 @@ def substep(b, i, lanes, part, inverses, model, weather):
     vertical = abs(state.z) <= model.world.zone and model.world.vertical_mode > 0.0
     rates = euler_rates(attitude, state.p, state.q, state.r)
     reference = reference_at(b, i, lanes, part[0] * inverses[0], inverses[1])
-    surface = Surface(0.0, 0.0, 0.0, 0.0, 0.0) if weather is None else surface_below(weather, i, lanes, part[1])
+    surface = FLAT if weather is None else surface_below(weather, i, lanes, part[1])
     now = Instant(state, attitude, rates, reference, vertical, air, medium, surface)
     speeds, integral = control(now, integral, model, DT)
     if weather is None:

@@ -23,6 +23,15 @@ class WorldParams(NamedTuple):
     rough_fails: float  # 1 or 0
 
 
+# What a crossing may be, by name: fields of a `World`. None is steeper than a peak deceleration of 25 m/s^2 allows:
+# drag stops a vehicle that enters at 0.98 m/s with as much (26 1/m, Table 1), and the laws enter slower.
+CROSSINGS = {
+    "vertical": {},  # the paper's rule: vertical motion only inside the transition zone
+    "adaptive": {"vertical_mode": False},  # as smooth at the surface, free above and below it
+    "aggressive": {"vertical_mode": False, "rough_speed": 1.0, "rough_tilt": math.radians(15.0)},
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class World:
     """The box the vehicle lives in, with the water surface at z = 0 (paper, Sec. 4).

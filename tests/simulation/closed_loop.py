@@ -17,7 +17,7 @@ from hydrone_gym._jit import kernel
 from hydrone_gym.control.law import control
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.control.paper import PaperGains
-from hydrone_gym.control.reference import Instant, Integral, Reference, Surface
+from hydrone_gym.control.reference import FLAT, Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
 from hydrone_gym.simulation.storage import model_of, pack_model
@@ -54,7 +54,7 @@ def _control(values, state, integral, reference, vertical, air, dt, speeds):
     medium = medium_at(model.vehicle, air)
     attitude = attitude_of(s)
     rates = euler_rates(attitude, s.p, s.q, s.r)
-    now = Instant(s, attitude, rates, wanted, vertical, air, medium, Surface(0.0, 0.0, 0.0, 0.0, 0.0))
+    now = Instant(s, attitude, rates, wanted, vertical, air, medium, FLAT)
     out, new = control(now, memory, model, dt)
     for i in range(4):
         speeds[i] = out[i]
