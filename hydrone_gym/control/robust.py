@@ -110,7 +110,7 @@ def steer(now, gains, flow, limit):
 
 @inlined
 def flow_near(now, world):
-    """Velocity and acceleration of the water (x, y in m/s and m/s^2) for a vehicle in the transition zone, else zero."""
+    """Velocity and its rate (x, y in m/s and m/s^2) of the water for a vehicle in the transition zone, else zero."""
     water, near = now.surface, abs(now.state.z) <= world.zone
     return (
         water.vx if near else 0.0,
@@ -142,7 +142,6 @@ def surface_limits(now, gains, flow, world):
     Nobody reaches the surface faster than the crossing may be, sideways or downwards: who is too fast comes down as
     fast as braking takes, and waits above the water for the rest.
     """
-    state = now.state
     height, seconds = way_left(now, gains)
     excess = too_fast(now, gains, flow, seconds, world)
     smooth = gains.crossing_share * world.rough_speed
