@@ -17,7 +17,9 @@ CODE = "import hydrone_gym._jit as jit; print(jit._fingerprint('hydrone_gym.simu
 
 def fingerprint_in(root):
     """The fingerprint of the outermost kernel in a copy of the project."""
-    shown = subprocess.run([sys.executable, "-c", CODE], cwd=root, capture_output=True, text=True, check=True)
+    shown = subprocess.run(
+        [sys.executable, "-c", CODE], cwd=root, capture_output=True, text=True, timeout=120, check=True
+    )
     return shown.stdout.strip()
 
 

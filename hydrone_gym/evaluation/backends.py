@@ -56,7 +56,21 @@ def runner(backend: str | None, jobs: int | None, most: int) -> Iterator[Runner]
         except ValueError:  # a backend that returns results only all at once: Ray's, for one
             yield _in_portions
         else:
-            yield parallel
+
+            def run(calls: Iterable[Any]) -> Generator[Any, None, None]:
+                with _deaf():  # workers start here
+                    return parallel(calls)
+
+            yield run
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Leave Ctrl-C to this process: those it starts meanwhile are ended by it, not in the middle of anything."""
+    with contextlib.ExitStack() as stack:
+        if threading.current_thread() is threading.main_thread():
+            stack.callback(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, signal.SIG_IGN))
+        yield
 
 
 def check_jobs(jobs: int | None) -> None:
@@ -76,7 +90,7 @@ def _in_portions(calls: Iterable[Any]) -> Generator[Any, None, None]:
 
 
 def _dask(stack: contextlib.ExitStack, jobs: int | None) -> None:
-    """See to it that there is a client; processes that it starts here leave Ctrl-C to this one."""
+    """See to it that there is a client."""
     import dask
     from distributed import Client
 
@@ -86,9 +100,7 @@ def _dask(stack: contextlib.ExitStack, jobs: int | None) -> None:
         if dask.config.get("scheduler-address", None) is not None:
             stack.enter_context(Client())
             return
-        with contextlib.ExitStack() as deaf:
-            if threading.current_thread() is threading.main_thread():
-                deaf.callback(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, signal.SIG_IGN))
+        with _deaf():
             client = Client(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
         stack.enter_context(client)
 

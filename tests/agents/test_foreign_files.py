@@ -149,7 +149,7 @@ def test_bombs_are_refused_in_little_time_and_memory(folder, tmp_path):
     for bomb, copy in zip(BOMBS, folders, strict=True):
         bomb(copy)
     command = [sys.executable, "-c", SCRIPT, *map(str, folders)]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert (run.returncode, run.stderr) == (0, "")
     for (bomb, message), copy, line in zip(BOMBS.items(), folders, run.stdout.splitlines(), strict=True):
         assert line.startswith(f"{copy / TEXT}: "), bomb

@@ -20,6 +20,7 @@ from agents.training import TrainingRun, resume, train
 from hydrone_gym._folder_lock import held
 from hydrone_gym.cli import main
 from tests.agents.test_training import PERIOD, RECIPES, SMALL, curve, layers, small_run, written
+from tests.processes import finish, started
 
 OUT = "run"
 
@@ -200,8 +201,10 @@ def test_two_at_once(here):
     """Two processes, one folder: one trains, the other says that it does not."""
     command = [sys.executable, "-c", "import sys; from hydrone_gym.cli import main; sys.exit(main())", "train"]
     command += ["--recipe", "small.yml", "--out", OUT, "--evaluation-episodes", "0", "--json"]
-    both = [subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    printed = [process.communicate()[1] for process in both]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with started(command, **pipes) as one, started(command, **pipes) as other:
+        both = one, other
+        printed = [finish(process)[1] for process in both]
     assert sorted(process.returncode for process in both) == [0, 2]
     (refusal,) = [text for process, text in zip(both, printed, strict=True) if process.returncode == 2]
     (line,) = refusal.splitlines()
@@ -217,12 +220,15 @@ def interrupt(monkeypatch, at, go):
             os.kill(os.getpid(), signal.SIGINT)
         return step(self)
 
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a script runs in the background
     with monkeypatch.context() as patch:
         patch.setattr(RunLog, "_on_step", step)
         try:
             return go()
         except KeyboardInterrupt:
             return None
+        finally:
+            signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_says_how_to_go_on(here, capsys, monkeypatch):

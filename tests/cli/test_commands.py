@@ -133,7 +133,9 @@ def test_an_agent_of_a_name_flies_the_same_wherever_it_is_named(options, tmp_pat
 def test_version_and_module(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"hydrone {hydrone_gym.__version__}\n"
-    shown = subprocess.run([sys.executable, "-m", "hydrone_gym", "--version"], capture_output=True, text=True)
+    shown = subprocess.run(
+        [sys.executable, "-m", "hydrone_gym", "--version"], capture_output=True, text=True, timeout=120
+    )
     assert shown.stdout == f"hydrone {hydrone_gym.__version__}\n"
 
 

@@ -2,11 +2,9 @@
 
 import csv
 import json
-import os
 import signal
 import subprocess
 import sys
-import time
 
 import joblib
 import pytest
@@ -15,6 +13,7 @@ from hydrone_gym import cli
 from hydrone_gym._folder_lock import held
 from hydrone_gym.evaluation import DEFAULT_POLICIES, evaluate, read_records
 from tests.evaluation.test_run import timeless
+from tests.processes import LIMIT, completed, finish, send, started, wait_until
 
 # A process that a script started in the background ignores Ctrl-C unless it asks for it.
 PROGRAM = (
@@ -54,9 +53,7 @@ def remarks(err):
 
 
 def run(*options):
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM, "evaluate", *map(str, options)], capture_output=True, text=True
-    )
+    return completed([sys.executable, "-c", PROGRAM, "evaluate", *map(str, options)])
 
 
 def test_writes_rows_summary_and_tables(tmp_path, capsys):
@@ -148,15 +145,11 @@ def uninterrupted():
 def test_a_stopped_evaluation_goes_on_to_the_same_rows(how, tmp_path, uninterrupted):
     command = [sys.executable, "-c", PROGRAM, "evaluate", *STOPPED, "--out", str(tmp_path)]
     rows = tmp_path / "rows.csv"
-    with subprocess.Popen(
-        command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True
-    ) as process:
-        until = time.monotonic() + 120.0
-        while (not rows.exists() or rows.read_bytes().count(b"\n") < 15) and time.monotonic() < until:
-            time.sleep(0.02)
-        os.killpg(process.pid, how)  # as a terminal does: workers too
-        told = process.stderr.read().decode()
-        assert process.wait(timeout=60) == (130 if how is signal.SIGINT else -how)
+    with started(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        wait_until(lambda: rows.exists() and rows.read_bytes().count(b"\n") >= 15, process)
+        send(process, how)  # as a terminal does: workers too
+        told = finish(process)[1]
+        assert process.returncode == (130 if how is signal.SIGINT else -how), told
     if how is signal.SIGINT:
         assert told == "hydrone: interrupted; finished flights are kept, the same command goes on\n"
     kept = read_records(rows)
@@ -174,20 +167,15 @@ def test_a_stopped_evaluation_goes_on_to_the_same_rows(how, tmp_path, uninterrup
 
 def test_a_folder_in_use_gives_2_at_once_and_a_killed_run_leaves_it_free(tmp_path, capsys):
     command = ["evaluate", *STOPPED, "--worlds", "60", "--out", str(tmp_path)]
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *command], stderr=subprocess.DEVNULL, start_new_session=True
-    ) as process:
-        until = time.monotonic() + 120.0
-        while not (tmp_path / "rows.csv").exists() and time.monotonic() < until:
-            time.sleep(0.02)
+    with started([sys.executable, "-c", PROGRAM, *command], stderr=subprocess.DEVNULL) as process:
+        wait_until((tmp_path / "rows.csv").exists, process)
         assert cli.main(command) == 2
         busy = f"hydrone: error: {tmp_path} is in use by another run (pid {process.pid})\n"
         assert capsys.readouterr() == ("", busy)
         process.kill()  # its workers find out later
-        process.wait()
+        process.wait(LIMIT)
         with held(tmp_path):
             pass
-        os.killpg(process.pid, signal.SIGKILL)
     assert read_records(tmp_path / "rows.csv")
 
 
@@ -278,7 +266,7 @@ def test_a_full_disk_gives_1_and_keeps_rows(limit, finished, tmp_path):
     """A limit on the size of files stands in for it: it stops the rows, or the summary after them."""
     limited = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit})); {PROGRAM}"
     command = [sys.executable, "-c", limited, "evaluate", *TWO, "--worlds", "3", "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = completed(command)
     assert done.returncode == 1
     assert done.stderr.startswith("hydrone: error: ")
     assert "File too large" in done.stderr

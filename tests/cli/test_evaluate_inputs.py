@@ -1,7 +1,6 @@
 """`hydrone evaluate` and `hydrone fly` given what users get wrong: one line each, and what was finished is kept."""
 
 import json
-import subprocess
 import sys
 
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from hydrone_gym import cli
 from hydrone_gym.evaluation import read_records
 from tests.cli.test_evaluate import remarks
+from tests.processes import completed
 
 POLICY = """
 import sys, time
@@ -122,7 +122,7 @@ def test_a_policy_that_prints_and_spoils_what_it_is_given_changes_nothing(writte
         *options,
     ]
     program = "import sys; from hydrone_gym.cli import main; sys.exit(main())"
-    done = subprocess.run([sys.executable, "-c", program, *command], capture_output=True, text=True, check=True)
+    done = completed([sys.executable, "-c", program, *command])
     assert json.loads(done.stdout)["rows"] == 2
     assert "ahoy" in done.stderr
     assert "made" in done.stderr

@@ -14,6 +14,7 @@ from hydrone_gym import cli
 from hydrone_gym.evaluation import fly
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario
 from planners import CLRRT
+from tests.processes import finish, started
 
 EMPTY = ["fly", "--policy", "straight-line", "--obstacles", "0", "--no-figures"]
 
@@ -366,7 +367,9 @@ def test_the_installed_command(tmp_path):
 def test_a_reader_that_leaves_early_gets_no_traceback(tmp_path):
     program = "import sys; from hydrone_gym.cli import main; sys.exit(main())"
     arguments = [sys.executable, "-c", program, *EMPTY, "--json", "--out", str(tmp_path)]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        process.stdout.close()
-        assert "Traceback" not in process.stderr.read()
-        assert process.wait(timeout=120) == 1
+    reads, writes = os.pipe()
+    os.close(reads)
+    with started(arguments, stdout=writes, stderr=subprocess.PIPE, text=True) as process:
+        os.close(writes)
+        assert "Traceback" not in finish(process)[1]
+        assert process.returncode == 1

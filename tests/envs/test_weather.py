@@ -151,7 +151,7 @@ json.dump(told, sys.stdout)
 
 def test_every_process_has_the_same_weather():
     first, second = (
-        subprocess.run([sys.executable, "-c", FLIGHT], capture_output=True, text=True, check=True).stdout
+        subprocess.run([sys.executable, "-c", FLIGHT], capture_output=True, text=True, timeout=120, check=True).stdout
         for _ in range(2)
     )
     assert json.loads(first) == json.loads(second)

@@ -2,6 +2,7 @@
 
 import os
 import runpy
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -25,7 +26,7 @@ def checkout(tmp_path, monkeypatch):
         monkeypatch.delenv(name, raising=False)
     who = ["-c", "user.name=n", "-c", "user.email=e"]
     for command in (["init", "-q"], ["add", "."], [*who, "commit", "-q", "-m", "first"]):
-        subprocess.run(["git", "-C", folder, *command], check=True)
+        subprocess.run(["git", "-C", folder, *command], timeout=60, check=True)
     stub = ModuleType("interface")
     stub.BuildHookInterface = SimpleNamespace
     monkeypatch.setitem(sys.modules, "hatchling.builders.hooks.plugin.interface", stub)
@@ -44,17 +45,19 @@ def built(folder, version="standard"):
 
 
 def test_a_build_notes_the_commit_and_leaves_the_checkout_clean(checkout, tmp_path):
-    head = subprocess.run(["git", "-C", checkout, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
+    head = subprocess.run(
+        ["git", "-C", checkout, "rev-parse", "HEAD"], capture_output=True, text=True, timeout=60, check=True
+    )
     commit = commit_of(checkout)
     assert commit == head.stdout[:12]
     ((path, text),) = built(checkout).items()
     assert (path, text) == ("hydrone_gym/evaluation/commit.txt", f"{commit}\n")
     assert built(checkout, "editable") == {}
     status = ["git", "-C", checkout, "status", "--porcelain"]
-    assert subprocess.run(status, capture_output=True, check=True).stdout == b""
+    assert subprocess.run(status, capture_output=True, timeout=60, check=True).stdout == b""
     installed = tmp_path / "site"  # outside the repository, as pip leaves it
     os.rename(checkout, installed)
-    subprocess.run(["rm", "-rf", installed / ".git"], check=True)
+    shutil.rmtree(installed / ".git")
     assert commit_of(installed) is None
     (installed / path).write_text(text)
     assert commit_of(installed) == commit

@@ -30,6 +30,7 @@ from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import WORLDS_A_JOB, make_plan
 from hydrone_gym.evaluation.records import TIMING
 from planners import CLRRT, StraightLine
+from tests.processes import completed
 
 FEW = {"policies": ["straight-line", "straight-line-shield", "clrrt", "ppo"], "worlds": WORLDS_A_JOB + 1}
 
@@ -137,7 +138,7 @@ def test_rows_from_a_cluster_of_two_nodes_are_those_of_a_serial_run(serial, tmp_
 
     script = tmp_path / "on_ray.py"
     script.write_text(RAY % (FEW["policies"], FEW["worlds"]))
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=300, check=False)
+    done = completed([sys.executable, script], 300.0)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.partition("ROWS\n")[2].splitlines()
     assert timeless(map(from_line, lines)) == timeless(serial)

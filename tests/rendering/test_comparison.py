@@ -114,4 +114,4 @@ def test_equal_figures_give_equal_bytes():
 
 def test_matplotlib_is_imported_when_a_figure_is_drawn():
     code = "import sys, hydrone_gym.rendering.comparison; sys.exit('matplotlib' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], timeout=120, check=False).returncode == 0
