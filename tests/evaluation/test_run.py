@@ -1,6 +1,7 @@
 """Evaluations give the same rows however they are run."""
 
 import json
+import signal
 import subprocess
 import sys
 from collections import Counter
@@ -242,3 +243,10 @@ def test_shipped_agents_fly_without_torch():
 def test_there_are_no_more_workers_than_calls(jobs, calls, workers):
     with runner("threading", jobs, calls):
         assert joblib.parallel.get_active_backend()[1] == workers
+
+
+def test_workers_leave_ctrl_c_to_the_process_that_started_them():
+    before = signal.getsignal(signal.SIGINT)
+    with runner("loky", 2, 2) as run:
+        assert list(run([joblib.delayed(signal.getsignal)(signal.SIGINT)] * 2)) == [signal.SIG_IGN] * 2
+    assert signal.getsignal(signal.SIGINT) is before
