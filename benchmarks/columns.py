@@ -218,11 +218,10 @@ class Column:
     seed: int = 0
 
 
-def fly_column(vehicle: Vehicle, column: Column, weather: Weather | None = None, law: str = "paper") -> Flights:
-    """Fly a vehicle as it is, under a law that believes the nominal one, through a column."""
-    n = LANES * max(1, -(-column.flights // LANES))
-    rng, weather = np.random.default_rng(column.seed), weather or Weather()
-    rows, path = new_rows(n), np.zeros((2, n, 4))
+def ready(vehicle: Vehicle, column: Column, weather: Weather) -> tuple[np.ndarray, ...]:
+    """Return rows (n,) at their starts, the (2, n, 4) references that they fly to, and their conditions."""
+    rng, n = np.random.default_rng(column.seed), LANES * max(1, -(-column.flights // LANES))
+    rows, path, order = new_rows(n), np.zeros((2, n, 4)), np.arange(n)
     sideways, upwards = column.spread
     offsets = rng.uniform(-1.0, 1.0, (n, 3)) * (sideways, sideways, upwards)
     rows["state"][:, :3] = offsets + (0.0, 0.0, column.start)
@@ -231,25 +230,29 @@ def fly_column(vehicle: Vehicle, column: Column, weather: Weather | None = None,
     path[0], path[1, :, 2] = rows["reference"], column.end
     streams = rng.integers(0, 2**32, (n, 3)).astype(np.float64)
     climate = climate_of(vehicle, weather, weather.spread, DEPTH)[None]
-    conditions, order = np.zeros((n // LANES, CONDITIONS * LANES)), np.arange(n)
+    conditions = np.zeros((n // LANES, CONDITIONS * LANES))
     begin_conditions(conditions, LANES, rows, order, streams, climate, np.zeros(n, np.int64))
-    side = math.copysign(1.0, column.start)
-    passage = Passage(0.0, 0.0, 0.0, side, np.inf, np.inf, 0.0, 0.0, 1.0)
+    return rows, path, conditions
+
+
+def fly_column(vehicle: Vehicle, column: Column, weather: Weather | None = None, law: str = "paper") -> Flights:
+    """Fly a vehicle as it is, under a law that believes the nominal one, through a column."""
+    rows, path, conditions = ready(vehicle, column, weather or Weather())
+    passage = Passage(0.0, 0.0, 0.0, math.copysign(1.0, column.start), np.inf, np.inf, 0.0, 0.0, 1.0)
     first = packed(Watched(passage, Surface(0.0, 0.0, 1.0, np.nan)))
-    seen = np.tile(np.repeat(first, LANES), (n // LANES, 1))
+    seen = np.tile(np.repeat(first, LANES), (len(conditions), 1))
     hold, most = (math.ceil(t / PERIOD - 1e-9) for t in (column.hold, column.hold + column.limit))
     times = np.array([hold, most, column.stop, ticks_in(PERIOD)], np.int64)
     values = pack_model(vehicle, WORLD, named_law(law))
     fly_blocks(compiled(law).address, rows, path, times, new_block(LANES), conditions, values, seen)
-    found = seen.reshape(n // LANES, size_of(Watched), LANES).transpose(0, 2, 1).reshape(n, -1)
+    found = seen.reshape(-1, size_of(Watched), LANES).transpose(0, 2, 1).reshape(len(rows), -1)
     return _flights(rows, found, hold * PERIOD)
 
 
 def _flights(rows: np.ndarray, found: NDArray[np.float64], hold: float) -> Flights:
     """Name what was seen (n, numbers of `Watched`)."""
     passage, surface = Passage(*found[:, : SEEN.surface].T), Surface(*found[:, SEEN.surface :].T)
-    tilts = (np.arccos(np.minimum(cosine, 1.0)) for cosine in (passage.cos_tilt, surface.cos_tilt))
-    tilt, surface_tilt = tilts
+    tilt, surface_tilt = (np.arccos(np.minimum(least, 1.0)) for least in (passage.cos_tilt, surface.cos_tilt))
     return Flights(
         rows["outcome"].copy(),
         passage.began - hold,

@@ -56,7 +56,7 @@ class Settings:
 
 
 def limited(speed: float) -> Vehicle:
-    """The vehicle of the authors' simulator, its rotors in the wind, whose laws are limited to a vertical speed (m/s)."""
+    """The authors' vehicle of 2021, its rotors in the wind, with a law that is limited to a vertical speed (m/s)."""
     air = replace(HYDRONE_2021.air_gains, zone_speed_limit=speed, vertical_speed_limit=speed)
     water = replace(HYDRONE_2021.water_gains, vertical_speed_limit=speed)
     return replace(HYDRONE_2021, air_gains=air, water_gains=water, rotor_drag=ROTOR_DRAG)

@@ -21,7 +21,7 @@ from hydrone_gym.rendering import style
 PAGE, IMAGES = ROOT / "docs" / "crossings.md", ROOT / "docs" / "images"
 ENOUGH = 0.99  # of the flights
 DIRECTIONS = {"entry": "water entry", "exit": "water exit"}
-RULES = {"smooth": "smooth", "aggressive": "aggressive"}
+RULES = ("smooth", "aggressive")
 _DARK = 55.0  # %: numbers on less are white
 
 Cells = dict[tuple[str, float, float, float], dict[str, Any]]
@@ -38,36 +38,39 @@ def axes_of(cells: Cells) -> tuple[list[float], list[float], list[float]]:
     return winds, heights, speeds
 
 
-def percent(share: list[float]) -> str:
-    """A rate with its interval, in percent."""
-    value, low, high = (100.0 * part for part in share)
-    return f"{value:.1f} [{low:.1f}, {high:.1f}]"
-
-
-def fastest(cells: Cells, direction: str, wind: float, height: float, rule: str) -> dict[str, Any] | None:
-    """The cell of the greatest speed at which enough flights keep a rule."""
-    flown = [c for place, c in cells.items() if place[:3] == (direction, wind, height) and c[rule][0] >= ENOUGH]
+def fastest(cells: Cells, place: tuple[str, float, float], rule: str) -> dict[str, Any] | None:
+    """The cell of the greatest speed at which enough flights keep a rule; place: direction, wind, height of waves."""
+    flown = [c for where, c in cells.items() if where[:3] == place and c[rule][0] >= ENOUGH]
     return max(flown, key=lambda c: c["speed"], default=None)
+
+
+def _fastest(cells: Cells, place: tuple[str, float, float], rule: str) -> str:
+    found = fastest(cells, place, rule)
+    if found is None:
+        return "–"
+    value, low, high = (100.0 * part for part in found[rule])
+    return f"{found['speed']:g}: {value:.1f} [{low:.1f}, {high:.1f}]"
 
 
 def fastest_sheet(law: str, measured: dict[str, Any]) -> Sheet:
     """The fastest crossing of each sea and wind."""
     cells, rows = by_place(measured), []
     winds, heights, _ = axes_of(cells)
+    kinds = [(direction, rule) for direction in DIRECTIONS for rule in RULES]
     for wind in winds:
         for height in heights:
-            found = [fastest(cells, direction, wind, height, rule) for direction in DIRECTIONS for rule in RULES]
-            rules = [rule for _ in DIRECTIONS for rule in RULES]
-            shown = [
-                "–" if c is None else f"{c['speed']:g}: {percent(c[r])}" for c, r in zip(found, rules, strict=True)
-            ]
+            shown = [_fastest(cells, (direction, wind, height), rule) for direction, rule in kinds]
             rows.append((f"{wind:g}", f"{height:g}", *shown))
-    columns = [f"{name}, {rule}" for name in DIRECTIONS.values() for rule in RULES.values()]
+    columns, limits = [f"{DIRECTIONS[direction]}, {rule}" for direction, rule in kinds], measured["limits"]
     return Sheet(
         f'Fastest crossing, `controller="{law}"`',
         ("wind m/s", "waves m", *columns),
         rows,
-        ["Greatest vertical speed (m/s) at which at least 99 % of the flights come through: their share [95 %] in %."],
+        [
+            f"Greatest vertical speed (m/s) at which at least {100 * ENOUGH:g} % of the flights cross so, and their "
+            f"share [95 %] in %. Aggressive: at most {limits['lateral']:g} m/s sideways, {limits['tilt']:g}° and "
+            f"{limits['acceleration']:g} m/s²."
+        ],
     )
 
 
@@ -128,7 +131,7 @@ def draw(law: str, measured: dict[str, Any]) -> Figure:
     cells = by_place(measured)
     winds, heights, speeds = axes_of(cells)
     kinds = [(direction, rule) for direction in DIRECTIONS for rule in RULES]
-    with plt.rc_context({**style.FONTS, "axes.spines.top": True, "axes.spines.right": True}):
+    with plt.rc_context(style.FONTS):
         figure, panels = plt.subplots(
             len(kinds), len(winds), figsize=(13.0, 9.6), sharex=True, sharey=True, layout="constrained"
         )
@@ -136,7 +139,7 @@ def draw(law: str, measured: dict[str, Any]) -> Figure:
             for panel, wind in zip(line, winds, strict=True):
                 shares = [[cells[direction, wind, h, v][rule][0] for v in speeds] for h in heights]
                 image = _heat(panel, 100.0 * np.array(shares))
-            line[0].set_ylabel(f"{DIRECTIONS[direction]}, {RULES[rule]}\nheight of waves (m)")
+            line[0].set_ylabel(f"{DIRECTIONS[direction]},\n{rule}\nwaves (m)")
             line[0].set_yticks(range(len(heights)), [f"{h:g}" for h in heights])
         for panel, wind in zip(panels[0], winds, strict=True):
             panel.set_title(f"wind {wind:g} m/s")
@@ -152,7 +155,7 @@ def _heat(panel: Any, shares: np.ndarray) -> Any:
     """Draw shares (heights, speeds) in percent, each with its number."""
     image = panel.imshow(shares, cmap="cividis", vmin=0.0, vmax=100.0, origin="lower", aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
-        text = f"{share:.0f}" if share < 99.0 or share == 100.0 else f"{share:.1f}"
+        text = f"{share:.1f}" if 98.0 < share < 100.0 else f"{share:.0f}"
         colour = "white" if share < _DARK else style.BLACK
         panel.text(column, row, text, ha="center", va="center", color=colour, fontsize=10)
     return image
