@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from benchmarks.results import origin_of
 from benchmarks.tables import Sheet, put_into
 from benchmarks.timing import RESULTS, ROOT
-from hydrone_gym.control.laws import LAWS
 from hydrone_gym.rendering import style
 
 PAGE, IMAGES = ROOT / "docs" / "crossings.md", ROOT / "docs" / "images"
@@ -63,7 +62,7 @@ def fastest_sheet(law: str, measured: dict[str, Any]) -> Sheet:
             rows.append((f"{wind:g}", f"{height:g}", *shown))
     columns, limits = [f"{DIRECTIONS[direction]}, {rule}" for direction, rule in kinds], measured["limits"]
     return Sheet(
-        f'Fastest crossing, `controller="{law}"`',
+        f"Fastest crossing, `{law}`",
         ("wind m/s", "waves m", *columns),
         rows,
         [
@@ -87,7 +86,7 @@ def full_sheet(law: str, measured: dict[str, Any], direction: str) -> Sheet:
         "Flights that cross smoothly / within the aggressive limits, in % · peak acceleration, m/s² · peak tilt, ° · "
         "time through the zone, s; peaks: 95 % of the flights that come through stay below, times: their median."
     )
-    return Sheet(f'{DIRECTIONS[direction].capitalize()}, `controller="{law}"`', columns, rows, [note])
+    return Sheet(f"{DIRECTIONS[direction].capitalize()}, `{law}`", columns, rows, [note])
 
 
 def _summary(c: dict[str, Any]) -> str:
@@ -109,7 +108,7 @@ def lag_sheet(law: str, measured: dict[str, Any]) -> Sheet:
     ]
     names = [f"{DIRECTIONS[direction]}, {f'hull {hull:g} m' if hull else 'abrupt'}" for direction, hull in kinds]
     return Sheet(
-        f'Lag and late notice, `controller="{law}"`',
+        f"Lag and late notice, `{law}`",
         ("rotor lag ms", "noticed after ms", *names),
         rows,
         [
@@ -163,8 +162,8 @@ def _heat(panel: Any, shares: np.ndarray) -> Any:
 
 def _records(study: str, results: Path) -> dict[str, dict[str, Any]]:
     """What a study last measured, by law."""
-    paths = {law: results / f"{study}-{law}.json" for law in LAWS}
-    return {law: json.loads(path.read_text(encoding="utf-8")) for law, path in paths.items() if path.exists()}
+    records = [json.loads(path.read_text(encoding="utf-8")) for path in results.glob(f"{study}-*.json")]
+    return {record["law"]: record for record in sorted(records, key=lambda record: record["law"])}
 
 
 def section(results: Path = RESULTS) -> str:
