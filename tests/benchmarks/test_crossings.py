@@ -13,6 +13,7 @@ from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.simulation import LANES, Simulation
 from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.weather import Weather
+from hydrone_gym.world.world import CROSSINGS
 
 FLIGHTS = 128
 
@@ -81,6 +82,8 @@ def test_a_hull_softens_the_entry():
 
 
 def test_limits_are_those_of_the_world_and_of_an_aggressive_crossing():
+    assert CROSSINGS["aggressive"]["rough_speed"] == crossings.AGGRESSIVE.lateral
+    assert CROSSINGS["aggressive"]["rough_tilt"] == np.radians(crossings.AGGRESSIVE.tilt)
     base = fly_column(HYDRONE, Column(start=2.0, end=-2.0, limit=8.0, flights=16))
     good = {"through": np.full(16, 4.0), "lateral": np.full(16, 0.2), "surface_tilt": np.full(16, np.radians(5.0))}
     good |= {"tilt": np.full(16, np.radians(15.0)), "acceleration": np.full(16, 25.0), "outcome": np.zeros(16)}
