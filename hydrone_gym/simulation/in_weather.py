@@ -127,7 +127,7 @@ def surface_below(memory, i, lanes, sub):
 def weathered_step(memory, i, lanes, now, wanted, sub, spin_depth):
     """Advance lane i as the vehicle really is, in its weather; `sub` counts the tick's physics steps at its end.
 
-    While it rises above `spin_depth` (m), the aerial rotors of a vehicle that is driven in water turn too.
+    While it rises above `spin_depth` (m; 0: never), the aerial rotors of a vehicle that is driven in water turn too.
     Returns the new state, the rotors' shaft power (W), whether the controller now notices another medium, and the
     crossing: whether there is one, whether into air, and the velocity relative to the water (x, y, z in m/s).
     """
@@ -138,7 +138,8 @@ def weathered_step(memory, i, lanes, now, wanted, sub, spin_depth):
     fluid = gather(memory, AT.fluid, i, lanes, Fluid)
     noticed = gather(memory, AT.noticed, i, lanes, Noticed)
     after = sub * DT - 0.5 * TICK  # the end of this step, from the middle of the tick
-    rising = not driven and state.vz > 0.0 and state.z - elevation_at(fluid, after - DT) > -spin_depth
+    spins = spin_depth > 0.0 and not driven and state.vz > 0.0
+    rising = spins and state.z - elevation_at(fluid, after - DT) > -spin_depth
     idle = vehicle.hover_speed if rising else 0.0
     spun = idle + (noticed.spun - idle) * real.keep_air
     s1, s2, s3, s4 = lagged(rotors, wanted, real.mean_air if driven else real.mean_water)
