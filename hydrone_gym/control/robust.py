@@ -33,6 +33,8 @@ RobustGainParams = namedtuple("RobustGainParams", [spec.name for spec in fields(
 _LEAST_LIFT = 3.0  # m/s^2 of upward thrust that tilt is reckoned with, whatever the vehicle falls with
 _HOVER_BAND = 0.15  # m above the surface in which a vehicle waits that is too fast to cross
 _FORESEEN = 0.25  # s for which waves go on as they do
+_BRAKED = 0.5  # share of the braking that the approach to the surface reckons with
+_SMOOTH = 0.75  # share of the lateral speed of a rough crossing above which a vehicle waits
 _TILT_BAND = 0.65  # m above that over which tilt is given back
 _STILL = 0.06  # m/s through the water that is not worth a turn
 _ASTRAY = 0.6  # rad off course at which a vehicle under water only turns
@@ -124,7 +126,7 @@ def flow_near(now, world):
 def way_left(now, gains):
     """Return how far (m) a vehicle is from where it waits for the surface, and how many seconds it needs there."""
     height = max(abs(now.state.z - now.surface.elevation) - _HOVER_BAND, 0.0)
-    return height, height / max(abs(now.state.vz), 0.5 * gains.zone_speed_limit)
+    return height, height / max(abs(now.state.vz), gains.zone_speed_limit)
 
 
 @inlined
@@ -132,7 +134,7 @@ def too_fast(now, gains, flow, seconds, world):
     """Return by how much (m/s) the lateral speed through the water will exceed that of a smooth crossing."""
     soon = min(seconds + _HOVER_BAND / gains.zone_speed_limit, _FORESEEN)
     vx, vy = now.state.vx - flow[0] - soon * flow[2], now.state.vy - flow[1] - soon * flow[3]
-    return np.sqrt(vx * vx + vy * vy) - gains.crossing_share * world.rough_speed
+    return np.sqrt(vx * vx + vy * vy) - _SMOOTH * world.rough_speed
 
 
 @inlined
@@ -146,10 +148,10 @@ def surface_limits(now, gains, flow, world):
     excess = too_fast(now, gains, flow, seconds, world)
     smooth = gains.crossing_share * world.rough_speed
     fastest = np.sqrt(gains.zone_speed_limit * gains.zone_speed_limit + 2.0 * gains.zone_braking * height)
-    descent = min(fastest, gains.descent_limit)
-    descent = min(descent, height * gains.zone_braking / excess) if excess > 0.0 else descent
+    descent, braking = min(fastest, gains.descent_limit), _BRAKED * gains.braking
+    descent = min(descent, height * gains.braking / excess) if excess > 0.0 else descent
     crosses = now.reference.z <= 0.0
-    limit = min(gains.speed_limit, smooth + gains.zone_braking * seconds) if crosses else gains.speed_limit
+    limit = min(gains.speed_limit, smooth + braking * seconds) if crosses else gains.speed_limit
     cosine = world.rough_cos_tilt
     level = gains.level_share * np.sqrt(1.0 - cosine * cosine) / cosine
     share = clamp(height / _TILT_BAND, 0.0, 1.0)

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class WorldParams(NamedTuple):
@@ -25,7 +25,7 @@ class WorldParams(NamedTuple):
 
 # What a crossing may be, by name: fields of a `World`. None is steeper than a peak deceleration of 25 m/s^2 allows:
 # drag stops a vehicle that enters at 0.98 m/s with as much (26 1/m, Table 1), and the laws enter slower.
-CROSSINGS = {
+CROSSINGS: dict[str, dict[str, Any]] = {
     "vertical": {},  # the paper's rule: vertical motion only inside the transition zone
     "adaptive": {"vertical_mode": False},  # as smooth at the surface, free above and below it
     "aggressive": {"vertical_mode": False, "rough_speed": 1.0, "rough_tilt": math.radians(15.0)},
