@@ -31,6 +31,7 @@ _RISING = 0.5  # m: depth of the reference that a vehicle swims on with, until i
 _SLOW = 1.2  # m/s: a faster vehicle cannot be still at the edge of the zone within a period
 _LEAD = 0.8  # s: within this the reference that leads a vehicle into the zone is sought
 _BISECTIONS = 6
+_LEADS = (2.0, 1.2, 0.8, 0.5, 0.3)  # s, tried in this order where a vehicle need not be still in the zone
 _STILL = 0.1  # m/s: below this speed nothing is to be gained by where the reference leads
 _OPPOSITE = 0.85, 1.4  # m: least depth and height of the reference beyond the surface, for full speed inside the zone
 _LEAVING = 1.0  # m/s: no vehicle leaves the zone faster
@@ -73,7 +74,8 @@ def _onward(p, column, sample):
     """Return the `Point` that a vehicle goes to once it has crossed: over the sample, or the goal if it is there."""
     goal = p.check.goal
     dx, dy = sample.x - column[0], sample.y - column[1]
-    there = dx * dx + dy * dy < _NEAR * _NEAR
+    # who need not be still in the zone runs past the sample
+    there = dx * dx + dy * dy < _NEAR * _NEAR or p.check.world.vertical_mode == 0.0
     return Point(goal.x if there else sample.x, goal.y if there else sample.y, goal.z)
 
 
@@ -84,6 +86,12 @@ def _beyond(p, s, down):
     on = p.objective.speeds.dive * (1.1 + p.check.period)
     z = min(-_OPPOSITE[0], s.z - on) if down else max(_OPPOSITE[1], s.z + on)
     return clamp(z, w.z_min + 0.1, w.z_max - 0.1)
+
+
+@inlined
+def _zone(p):
+    """Half-height (m) of the zone in which motion is vertical; nothing where it need not be."""
+    return p.check.world.zone if p.check.world.vertical_mode > 0.0 else 0.0
 
 
 @routine
@@ -97,7 +105,7 @@ def _leave(p, source, slot, column, onward):
         x, y, z, psi = air_reference(p, vessel, onward, column[3], p.settings.step)
         z = max(z, _beyond(p, s, down))
     ended, flown, sway = zone_edge(p, source, slot, (x, y, z, psi), p.margin)
-    clear = abs(node_state(p, slot).z) > p.check.world.zone + _CLEAR_OF_ZONE
+    clear = abs(node_state(p, slot).z) > _zone(p) + _CLEAR_OF_ZONE
     return ended if clear or ended == ARRIVED else BLOCKED, flown, sway
 
 
@@ -105,7 +113,7 @@ def _leave(p, source, slot, column, onward):
 def _through(p, source, size, column, onward):
     """Append the way through the zone; return (new size, or the old one if it fails; lateral velocity then, m/s)."""
     first, current, down = size, source, is_air(column[2])
-    zone, sway = p.check.world.zone, (0.0, 0.0)
+    zone, sway = _zone(p), (0.0, 0.0)
     for _ in range(int(CROSS_LIMIT / p.check.period)):
         if size >= p.path.size - 1:
             break
@@ -142,6 +150,13 @@ def _enter(p, source, size, column, onward):
         return _through(p, source, size, (x, y, column[2], column[3]), onward)[0]
     if speed2 < _STILL * _STILL:
         return _through(p, source, size, column, onward)[0]
+    if w.vertical_mode == 0.0:  # the law slows down before the surface by itself
+        for lead in _LEADS:
+            x, y = inside(s.x + lead * s.vx, w.x_min, w.x_max), inside(s.y + lead * s.vy, w.y_min, w.y_max)
+            grown = _through(p, source, size, (x, y, column[2], column[3]), onward)[0]
+            if grown > size:
+                return grown
+        return size
     if speed2 > _SLOW * _SLOW:
         return size
     low, high = -_LEAD, _LEAD

@@ -17,13 +17,18 @@ ARRIVED = 2
 
 CROSSING_SPEED = 0.1  # m/s: a planned crossing is smoother than the one that counts as rough
 CROSSING_COS_TILT = np.cos(np.radians(2.0))
+SMOOTH = 0.9  # share of a rough crossing's speed and tilt, where motion in the zone need not be vertical
 ZONE_SPEED = 0.1  # m/s: lateral, inside the transition zone, where motion is vertical
 
 
 @inlined
-def _judged(flown, margin):
+def _judged(p, flown, margin):
     """Return how an edge ended: BLOCKED, FREE or ARRIVED."""
-    rough = flown.lateral_speed > CROSSING_SPEED or flown.cos_tilt < CROSSING_COS_TILT
+    w, vertical = p.check.world, p.check.world.vertical_mode > 0.0
+    fast = flown.lateral_speed > (CROSSING_SPEED if vertical else SMOOTH * w.rough_speed)
+    rough = fast or flown.cos_tilt < (
+        CROSSING_COS_TILT if vertical else 1.0 - SMOOTH * SMOOTH * (1.0 - w.rough_cos_tilt)
+    )
     if flown.clearance < margin or rough:
         return BLOCKED
     if flown.outcome == GOAL:
@@ -45,7 +50,7 @@ def edge(p, source, slot, reference, margin):
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
     flown = propagate(p.check.lane, start, end, p.check.goal, rounded)
-    return _judged(flown, margin), flown
+    return _judged(p, flown, margin), flown
 
 
 @routine
@@ -58,8 +63,9 @@ def zone_edge(p, source, slot, reference, margin):
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
     flown, sway = propagate_watched(p.check.lane, start, end, p.check.goal, rounded, p.check.world.zone)
-    fast = sway[0] * sway[0] + sway[1] * sway[1] > ZONE_SPEED * ZONE_SPEED
-    return BLOCKED if fast else _judged(flown, margin), flown, sway
+    vertical = p.check.world.vertical_mode > 0.0
+    fast = vertical and sway[0] * sway[0] + sway[1] * sway[1] > ZONE_SPEED * ZONE_SPEED
+    return BLOCKED if fast else _judged(p, flown, margin), flown, sway
 
 
 @inlined

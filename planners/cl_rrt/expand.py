@@ -94,7 +94,9 @@ def draw_column(p, draws, k, roam):
         cosine, sine = (dx * c - dy * s) / across, (dx * s + dy * c) / across
         depth = max(-WATER_GATE - min(root.z, goal.z), 0.0)
         speeds = p.objective.speeds
-        radius = speeds.water * depth / speeds.dive * between(share / _MEETING_SHARE, 0.7, 1.1)
+        # who need not be still in the zone runs on from the column
+        most = 1.8 if from_air and w.vertical_mode == 0.0 else 1.1
+        radius = speeds.water * depth / speeds.dive * between(share / _MEETING_SHARE, 0.7, most)
     else:
         sine, cosine = sincos(angle)
         radius = p.settings.column_radius * (share - _MEETING_SHARE) / (1.0 - _MEETING_SHARE)
@@ -201,7 +203,7 @@ def expand_tree(p, size, draws, iterations, roam):
         sample = draw_sample(p, draws, k, roam, beyond and best == np.inf and not paper)
         by_cost = draws[k + 1] < 0.5 and not paper
         step = _CAREFUL_SHARE * p.settings.step if sample.kind == CAREFUL_SAMPLE else p.settings.step
-        limit = _GOAL_EXTENSION if sample.kind == GOAL_SAMPLE else int(p.settings.extension)
+        limit = _GOAL_EXTENSION if sample.kind <= COLUMN_SAMPLE and not paper else int(p.settings.extension)
         limit = int(limit * EDGE_TIME / p.check.period)
         for _ in range(int(p.settings.tries)):
             i = next_node(p, size, sample, by_cost, iteration)

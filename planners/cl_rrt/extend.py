@@ -72,7 +72,8 @@ def extend(p, source, size, sample, limit, step):
 
     Returns the new size. Nodes of an extension that runs into something are kept and marked unsafe.
     """
-    current, first = source, size
+    current, first, goal = source, size, p.check.goal
+    sample = Point(sample.x, sample.y, sample.z)
     for _ in range(limit):
         if size >= p.path.size - 1:
             break
@@ -84,6 +85,8 @@ def extend(p, source, size, sample, limit, step):
                 break
             size = grown
             current = size - 1
+            if is_air(goal.z) == is_air(node_state(p, current).z) and not p.objective.paper > 0.0:
+                sample = Point(goal.x, goal.y, goal.z)  # what it was crossed for
             if p.nodes[current].goal:
                 break
             continue
