@@ -203,7 +203,8 @@ def expand_tree(p, size, draws, iterations, roam):
         sample = draw_sample(p, draws, k, roam, beyond and best == np.inf and not paper)
         by_cost = draws[k + 1] < 0.5 and not paper
         step = _CAREFUL_SHARE * p.settings.step if sample.kind == CAREFUL_SAMPLE else p.settings.step
-        limit = _GOAL_EXTENSION if sample.kind <= COLUMN_SAMPLE and not paper else int(p.settings.extension)
+        far = sample.kind == GOAL_SAMPLE or (sample.kind == COLUMN_SAMPLE and not paper)
+        limit = _GOAL_EXTENSION if far else int(p.settings.extension)
         limit = int(limit * EDGE_TIME / p.check.period)
         for _ in range(int(p.settings.tries)):
             i = next_node(p, size, sample, by_cost, iteration)
