@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel, routine
-from hydrone_gym._memory import call, gather, pointer, scatter
+from hydrone_gym._memory import call, gather, pointer, scatter, view
+from hydrone_gym.physics.kinematics import State
 from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.rows import Engine, advance_rows, set_move
@@ -117,6 +118,32 @@ def with_first(lane, number):
     return Lane(lane.address, lane.ticks, lane.values, lane.block, lane.obstacles, lane.closest, number)
 
 
+@inlined
+def _take_off(lane, start, goal, reference):
+    """Load a vehicle and where it is to go."""
+    b = lane.block
+    for k in range(VESSEL):
+        b[k] = start[k]
+    b[ENERGY] = 0.0
+    scatter(b, GOAL, 0, 1, gather(goal, 0, 0, 1, Point))
+    scatter(b, AT.episode, 0, 1, Episode(0.0, np.inf, np.float64(RUNNING), 0.0))
+    set_move(b, 0, 1, Pose(reference[0], reference[1], reference[2], reference[3]))
+
+
+@inlined
+def _land(lane, end, reference):
+    """Write where the vehicle ends; return the `Result`."""
+    b = lane.block
+    for k in range(REFERENCE):
+        end[k] = b[k]
+    scatter(end, REFERENCE, 0, 1, Pose(reference[0], reference[1], reference[2], reference[3]))
+    episode, speed, cosine = gather(b, AT.episode, 0, 1, Episode), 0.0, 1.0
+    for slot in range(int(min(b[CROSSINGS], LOGGED_CROSSINGS))):
+        entry = gather(b, LOG + slot * LOG_ENTRY, 0, 1, CrossingEntry)
+        speed, cosine = max(speed, entry.lateral_speed), min(cosine, entry.cos_tilt)
+    return Result(episode.outcome, episode.clearance, episode.crossings, speed, cosine, episode.ticks * TICK, b[ENERGY])
+
+
 @routine
 def propagate(lane, start, end, goal, reference):
     """Fly a vehicle for one period toward a reference and write where it ends; returns a `Result`.
@@ -128,23 +155,25 @@ def propagate(lane, start, end, goal, reference):
         goal: pointer to the goal, m.
         reference: (x, y, z, psi), m and rad.
     """
-    b = lane.block
-    for k in range(VESSEL):
-        b[k] = start[k]
-    b[ENERGY] = 0.0
-    scatter(b, GOAL, 0, 1, gather(goal, 0, 0, 1, Point))
-    scatter(b, AT.episode, 0, 1, Episode(0.0, np.inf, np.float64(RUNNING), 0.0))
-    new = Pose(reference[0], reference[1], reference[2], reference[3])
-    set_move(b, 0, 1, new)
-    call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, 0, lane.ticks, lane.ticks)
-    for k in range(REFERENCE):
-        end[k] = b[k]
-    scatter(end, REFERENCE, 0, 1, new)
-    episode, speed, cosine = gather(b, AT.episode, 0, 1, Episode), 0.0, 1.0
-    for slot in range(int(min(b[CROSSINGS], LOGGED_CROSSINGS))):
-        entry = gather(b, LOG + slot * LOG_ENTRY, 0, 1, CrossingEntry)
-        speed, cosine = max(speed, entry.lateral_speed), min(cosine, entry.cos_tilt)
-    return Result(episode.outcome, episode.clearance, episode.crossings, speed, cosine, episode.ticks * TICK, b[ENERGY])
+    _take_off(lane, start, goal, reference)
+    b, ticks = lane.block, lane.ticks
+    call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, 0, ticks, ticks)
+    return _land(lane, end, reference)
+
+
+@routine
+def propagate_watched(lane, start, end, goal, reference, zone):
+    """Do what `propagate` does, bit for bit, and look at every tick.
+
+    Returns the `Result` and the greatest lateral speed (m/s) at a tick that ends within `zone` m of the surface.
+    """
+    _take_off(lane, start, goal, reference)
+    b, ticks, fastest2 = lane.block, lane.ticks, 0.0
+    for tick in range(ticks):
+        call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, tick, tick + 1, ticks)
+        s = view(b, 0, State)
+        fastest2 = max(fastest2, s.vx * s.vx + s.vy * s.vy) if abs(s.z) <= zone else fastest2
+    return _land(lane, end, reference), np.sqrt(fastest2)
 
 
 @kernel
@@ -184,4 +213,4 @@ class Flock:
         advance_rows(self._engine, self.rows, references, *around, self._count, 0, ticks)
 
 
-__all__ = ["Flock", "Lane", "Result", "Rollout", "lane_of", "propagate"]
+__all__ = ["Flock", "Lane", "Result", "Rollout", "lane_of", "propagate", "propagate_watched"]

@@ -5,7 +5,7 @@ import numpy as np
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym._memory import pointer
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rollout import propagate
+from hydrone_gym.simulation.rollout import propagate, propagate_watched
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import node_state
 from planners.stop_check import single
@@ -17,6 +17,18 @@ ARRIVED = 2
 
 CROSSING_SPEED = 0.1  # m/s: a planned crossing is smoother than the one that counts as rough
 CROSSING_COS_TILT = np.cos(np.radians(2.0))
+ZONE_SPEED = 0.13  # m/s: lateral, inside the transition zone, where motion is vertical
+
+
+@inlined
+def _judged(flown, margin):
+    """Return how an edge ended: BLOCKED, FREE or ARRIVED."""
+    rough = flown.lateral_speed > CROSSING_SPEED or flown.cos_tilt < CROSSING_COS_TILT
+    if flown.clearance < margin or rough:
+        return BLOCKED
+    if flown.outcome == GOAL:
+        return ARRIVED
+    return FREE if flown.outcome == RUNNING else BLOCKED
 
 
 @routine
@@ -33,12 +45,17 @@ def edge(p, source, slot, reference, margin):
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
     flown = propagate(p.check.lane, start, end, p.check.goal, rounded)
-    rough = flown.lateral_speed > CROSSING_SPEED or flown.cos_tilt < CROSSING_COS_TILT
-    if flown.clearance < margin or rough:
-        return BLOCKED, flown
-    if flown.outcome == GOAL:
-        return ARRIVED, flown
-    return FREE if flown.outcome == RUNNING else BLOCKED, flown
+    return _judged(flown, margin), flown
+
+
+@routine
+def zone_edge(p, source, slot, reference, margin):
+    """Do what `edge` does, and be BLOCKED also by more lateral speed inside the transition zone than `ZONE_SPEED`."""
+    p.edges[0] += 1.0
+    start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
+    rounded = single(reference[0], reference[1], reference[2], reference[3])
+    flown, lateral = propagate_watched(p.check.lane, start, end, p.check.goal, rounded, p.check.world.zone)
+    return BLOCKED if lateral > ZONE_SPEED else _judged(flown, margin), flown
 
 
 @inlined

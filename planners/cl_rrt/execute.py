@@ -178,6 +178,11 @@ def verify_stop(p, first):
     end = pointer(p.nodes[p.nodes.size - 1])
     copy_vessel(vessel, end)
     node, count = first, 0
+    if p.nodes[first].kind == CROSSING and not p.objective.paper > 0.0:
+        safe, hover = can_hover(p.check, end)
+        if safe:
+            back_up(p, 0, hover)
+            return 1
     while p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
         if node < 0:  # what comes after it was pruned

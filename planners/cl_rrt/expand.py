@@ -89,8 +89,7 @@ def draw_column(p, draws, k, roam):
     radius = p.settings.column_radius * draws[k + 4]
     x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
     y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
-    z = -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT
-    return x, y, z if roam == ANY_MEDIUM else goal.z
+    return x, y, -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT
 
 
 @inlined
