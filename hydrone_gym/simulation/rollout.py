@@ -165,15 +165,16 @@ def propagate(lane, start, end, goal, reference):
 def propagate_watched(lane, start, end, goal, reference, zone):
     """Do what `propagate` does, bit for bit, and look at every tick.
 
-    Returns the `Result` and the greatest lateral speed (m/s) at a tick that ends within `zone` m of the surface.
+    Returns the `Result`, and the lateral velocity (x, y in m/s) where it was greatest within `zone` m of the surface.
     """
     _take_off(lane, start, goal, reference)
-    b, ticks, fastest2 = lane.block, lane.ticks, 0.0
+    b, ticks, vx, vy = lane.block, lane.ticks, 0.0, 0.0
     for tick in range(ticks):
         call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, tick, tick + 1, ticks)
         s = view(b, 0, State)
-        fastest2 = max(fastest2, s.vx * s.vx + s.vy * s.vy) if abs(s.z) <= zone else fastest2
-    return _land(lane, end, reference), np.sqrt(fastest2)
+        if abs(s.z) <= zone and s.vx * s.vx + s.vy * s.vy > vx * vx + vy * vy:
+            vx, vy = s.vx, s.vy
+    return _land(lane, end, reference), (vx, vy)
 
 
 @kernel

@@ -9,7 +9,7 @@ from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import REFERENCE, Pose
 from planners.stop_check import AIR_GATE, WATER_GATE, inside, state_of
 
-_LEAD = 1.5  # m the reference may be ahead of the vehicle: a reference that runs away drags it through obstacles
+_LEAD = 0.75  # s at cruise speed that the reference may be ahead: one that runs away drags the vehicle through obstacles
 _CLIMB = 0.6  # m of height an edge of 0.5 s may change
 _CARROT_TIME = 1.4  # s of travel ahead under water
 _CARROT_TURNING = 0.6  # m ahead while misaligned: beyond the hold radius, too near to swim an arc
@@ -26,8 +26,9 @@ def air_reference(p, vessel, aim, psi, step):
     rx, ry, rz = old.x + scale * dx, old.y + scale * dy, old.z + scale * dz
     lx, ly, lz = rx - s.x, ry - s.y, rz - s.z
     lead = np.sqrt(lx * lx + ly * ly + lz * lz)
-    if lead > _LEAD:
-        rx, ry, rz = s.x + lx * _LEAD / lead, s.y + ly * _LEAD / lead, s.z + lz * _LEAD / lead
+    most = _LEAD * p.check.envelope.cruise
+    if lead > most:
+        rx, ry, rz = s.x + lx * most / lead, s.y + ly * most / lead, s.z + lz * most / lead
     rz = max(rz, AIR_GATE)
     return inside(rx, w.x_min, w.x_max), inside(ry, w.y_min, w.y_max), inside(rz, w.z_min, w.z_max), psi
 
