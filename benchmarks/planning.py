@@ -49,7 +49,7 @@ class Arguments:
     """Mission types."""
     density: tuple[int, ...] = tuple(DENSITIES)
     """Numbers of spheres: 20 of 0.5-1.5 m, or 40 of 0.8-1.8 m radius."""
-    vehicle: Literal["paper", "physical"] = "paper"
+    vehicle: Literal["paper", "physical", "hydrone-agile"] = "paper"
     """Parameter set."""
     objective: Literal["time", "energy", "length", "paper"] = "time"
     """What the planner minimises."""

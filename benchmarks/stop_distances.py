@@ -6,7 +6,7 @@ python -m benchmarks.stop_distances
 import numpy as np
 
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.vehicle import HYDRONE, HYDRONE_PHYSICAL
+from hydrone_gym.vehicle import HYDRONE, HYDRONE_AGILE, HYDRONE_PHYSICAL
 from hydrone_gym.world.world import World
 from planners.cl_rrt.stopping import safe_speed, stop_distances
 
@@ -17,7 +17,7 @@ def main() -> None:
     """Measure and print."""
     print("| set | medium | stop distance m at speed m/s | cruise speed m/s | with latency |")
     print("|---|---|---|---|---|")
-    for vehicle in (HYDRONE, HYDRONE_PHYSICAL):
+    for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRONE_AGILE):
         simulation = Simulation(vehicle, World())
         for medium, speeds in SPEEDS.items():
             stops = stop_distances(simulation, np.array(speeds), air=medium == "air")

@@ -10,7 +10,7 @@ from gymnasium.envs.registration import register
 from hydrone_gym import _aliases as _aliases
 from hydrone_gym.physics.dynamics import state_derivative
 from hydrone_gym.simulation.outcome import Outcome
-from hydrone_gym.vehicle import HYDRONE, HYDRONE_2021, HYDRONE_PHYSICAL, AirGains, Vehicle, WaterGains
+from hydrone_gym.vehicle import HYDRONE, HYDRONE_2021, HYDRONE_AGILE, HYDRONE_PHYSICAL, AirGains, Vehicle, WaterGains
 from hydrone_gym.weather import Spread, Weather
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario
 from hydrone_gym.world.world import World
@@ -20,6 +20,7 @@ __version__ = "0.1.0"
 __all__ = [
     "HYDRONE",
     "HYDRONE_2021",
+    "HYDRONE_AGILE",
     "HYDRONE_PHYSICAL",
     "AirGains",
     "Outcome",

@@ -1,8 +1,8 @@
-"""Parameters of the vehicle: physical constants and controller gains, in three named sets.
+"""Parameters of the vehicle: physical constants and controller gains, in four named sets.
 
 `HYDRONE` is Table 1 of the paper as tabled; `HYDRONE_PHYSICAL` replaces the five entries that contradict physics
 (docs/deviations.md, E4, E6, E8, E14, E15); `HYDRONE_2021` adds what the authors' own simulator of 2021 has
-beyond it. They are one model: the equations never ask which set they were given.
+beyond it; `HYDRONE_AGILE` is `HYDRONE` with gains in air that use the tilt its rotors allow. They are one model: the equations never ask which set they were given.
 """
 
 import dataclasses
@@ -267,11 +267,16 @@ HYDRONE_2021 = Vehicle(
     thrust_water_curve=(1.0654e-3 * _PROPELLER, -1.4307e-7 * _PROPELLER, 2.3281e-11 * _PROPELLER),
 )
 
-_NAMED = {vehicle.name: vehicle for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRONE_2021)}
+HYDRONE_AGILE = Vehicle(
+    name="hydrone-agile",
+    air_gains=AirGains(tilt_limit=math.radians(35.0), position_p=0.4, position_d=0.5, speed_limit=2.7),
+)
+
+_NAMED = {vehicle.name: vehicle for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRONE_2021, HYDRONE_AGILE)}
 
 
 def named_vehicle(vehicle: str | Vehicle) -> Vehicle:
-    """Return the vehicle that a name stands for ("paper", "physical", "hydrone-2021"), or the vehicle itself.
+    """Return the vehicle that a name stands for ("paper", "physical", "hydrone-2021", "hydrone-agile"), or the vehicle itself.
 
     Raises ValueError for an unknown name and TypeError for anything else.
     """

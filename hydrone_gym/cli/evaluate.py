@@ -43,7 +43,7 @@ class Evaluate:
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
     worlds: int = 100  # First so many worlds of each mission.
     seed: int = 0  # Seed for policies that draw; the worlds are those of the suite.
-    vehicle: Literal["paper", "physical", "hydrone-2021"] = "paper"  # Parameter set of the vehicle.
+    vehicle: Literal["paper", "physical", "hydrone-2021", "hydrone-agile"] = "paper"  # Parameter set of the vehicle.
     baseline: str | None = None  # Policy that the others are compared with; clrrt if it is among them, else the first.
     jobs: int | None = None  # Flights at once, as many as there are cores unless given.
     backend: str = "loky"  # Backend of joblib: loky, threading, dask, ray.

@@ -47,7 +47,7 @@ class MissionOptions:
     time_budget: float | None = None
     """Seconds a CL-RRT cycle may take, instead of a number of samples; not reproducible."""
     scenario: Path | None = None  # Fly this scenario file instead.
-    vehicle: Literal["paper", "physical", "hydrone-2021"] = "paper"  # Parameter set of the vehicle.
+    vehicle: Literal["paper", "physical", "hydrone-2021", "hydrone-agile"] = "paper"  # Parameter set of the vehicle.
     weather: int = 0  # Level of wind, current, waves and of a vehicle that is not the nominal one, 0 to 5.
 
     def prepare(self) -> list[Prepared]:

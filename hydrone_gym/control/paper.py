@@ -191,6 +191,9 @@ def pre_spin_of(gains):
     return gains.air.pre_spin
 
 
+_TILTING = 0.11  # s that a stop takes longer because the vehicle must tilt first
+
+
 def _envelope_of(vehicle: Vehicle) -> Envelope:
     """Work out the limits of a vehicle under this law."""
     air, water, params = vehicle.air_gains, vehicle.water_gains, vehicle_params(vehicle)
@@ -201,7 +204,8 @@ def _envelope_of(vehicle: Vehicle) -> Envelope:
         surge=math.sqrt(2.0 * water.surge_limit * params.water.inverse_mass / params.water.drag_x),
         dive=water.vertical_speed_limit,
         zone=air.zone_speed_limit,
-        stop_time=0.45,  # 0.97 m from 2 m/s, less from lower speeds: benchmarks/stop_distances.py
+        # what the speed's first-order loop and the attitude's take, to the centisecond: benchmarks/stop_distances.py
+        stop_time=round(1.0 / (vehicle.gravity * air.position_d) + _TILTING, 2),
         ahead_air=0.2,
         ahead_water=0.1,
         hold_radius=water.hold_radius,

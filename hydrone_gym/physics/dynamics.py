@@ -137,7 +137,7 @@ def state_derivative(state: ArrayLike, rotor_speed: ArrayLike, vehicle: Vehicle 
             body). ``state[2] > 0`` is air, otherwise water.
         rotor_speed: (4,) rotor speeds in rpm. Thrust has the sign of the speed in both media; limits are the
             controller's business and are not applied here.
-        vehicle: a `Vehicle`, or "paper", "physical" or "hydrone-2021".
+        vehicle: a `Vehicle`, or "paper", "physical", "hydrone-2021" or "hydrone-agile".
 
     Returns:
         (12,) derivative of `state` (paper eqs. 1-4 and 9-12 with the corrections of docs/deviations.md).

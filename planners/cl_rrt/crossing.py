@@ -27,6 +27,7 @@ _BRAKE = 0.75  # s of braking after which another way to brake is tried
 _BRAKE_LEAD = 0.3  # s: where a reference that brakes leads the vehicle
 _BRAKE_HEIGHTS = (0.9, 1.3)  # m: the lower one is quicker, and enters the zone too early from a steep descent
 _BRAKE_SHARES = (0.0, 0.5, 1.0)  # of the reference in force in the one that brakes: the less, the harder
+_RISING = 0.5  # m: depth of the reference that a vehicle swims on with, until it brakes before the zone
 _SLOW = 1.2  # m/s: a faster vehicle cannot be still at the edge of the zone within a period
 _LEAD = 0.8  # s: within this the reference that leads a vehicle into the zone is sought
 _BISECTIONS = 6
@@ -136,7 +137,10 @@ def _enter(p, source, size, column, onward):
     """
     w, s, down = p.check.world, node_state(p, source), is_air(column[2])
     speed2 = s.vx * s.vx + s.vy * s.vy
-    if not down or speed2 < _STILL * _STILL:
+    if not down:  # water brakes whoever rises: at most a period before the zone
+        x, y = inside(s.x + _AHEAD * s.vx, w.x_min, w.x_max), inside(s.y + _AHEAD * s.vy, w.y_min, w.y_max)
+        return _through(p, source, size, (x, y, column[2], column[3]), onward)[0]
+    if speed2 < _STILL * _STILL:
         return _through(p, source, size, column, onward)[0]
     if speed2 > _SLOW * _SLOW:
         return size
@@ -199,6 +203,11 @@ def cross(p, source, size, sample):
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)
     onward = _onward(p, column, sample)
+    if not is_air(s.z):  # swim on while rising
+        x, y, _, psi = water_reference(p, pointer(p.nodes[source]), onward)
+        grown = _settle(p, source, size, (x, y, -_RISING, psi), onward, p.check.period)
+        if grown > size:
+            return grown
     grown = _enter(p, source, size, column, onward)
     if grown > size:
         return grown

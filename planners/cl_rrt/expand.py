@@ -30,6 +30,7 @@ _ROAM_HEIGHT = 1.5  # m
 _NEAR = 2.0  # m
 _CAREFUL_SHARE = 0.3  # of the usual step: slow enough to leave a gap that is hardly wider than the vehicle
 _OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it bounds from below what a path may cost
+_MEETING_SHARE = 0.5  # of the columns
 _WALL = 0.5  # m: samples keep this far from the walls
 
 
@@ -85,8 +86,17 @@ def draw_column(p, draws, k, roam):
     at_goal = from_air and roam != ANY_MEDIUM
     cx = goal.x if at_goal else root.x
     cy = goal.y if at_goal else root.y
-    sine, cosine = sincos(between(draws[k + 3], -np.pi, np.pi))
-    radius = p.settings.column_radius * draws[k + 4]
+    share, angle = draws[k + 4], between(draws[k + 3], -np.pi, np.pi)
+    if share < _MEETING_SHARE:  # where the swim takes as long as the dive, in the half that faces the other end
+        dx, dy = root.x + goal.x - 2.0 * cx, root.y + goal.y - 2.0 * cy
+        across, (s, c) = max(np.sqrt(dx * dx + dy * dy), 1e-9), sincos(0.5 * angle)
+        cosine, sine = (dx * c - dy * s) / across, (dx * s + dy * c) / across
+        depth = max(-WATER_GATE - min(root.z, goal.z), 0.0)
+        speeds = p.objective.speeds
+        radius = speeds.water * depth / speeds.dive * between(share / _MEETING_SHARE, 0.7, 1.1)
+    else:
+        sine, cosine = sincos(angle)
+        radius = p.settings.column_radius * (share - _MEETING_SHARE) / (1.0 - _MEETING_SHARE)
     x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
     y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
     return x, y, -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT

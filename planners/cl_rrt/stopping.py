@@ -12,6 +12,8 @@ from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 
 _DEPTH = 2.5  # m from the surface, clear of the transition zone
 _STOP = 5.0  # s
+_LEAST = 0.1  # of the cruise speed: nobody flies slower
+_STEP = 0.01  # m/s to which the safe speed is found
 _SPARE = 0.1  # m kept between the end of a stop and the edge of sensed space
 
 
@@ -38,8 +40,17 @@ def safe_speed(simulation: Simulation, periods_ahead: int) -> float:
         simulation: vehicle, world and period.
         periods_ahead: periods between sensing and the end of the edge decided on: 1, or 2 with planning latency.
     """
-    speeds = np.linspace(0.1, 1.0, 10) * envelope_of(simulation.vehicle, simulation.law).cruise
+    cruise = envelope_of(simulation.vehicle, simulation.law).cruise
     room = simulation.world.sensor_range - simulation.vehicle.radius - _SPARE
-    needed = speeds * simulation.period * periods_ahead + stop_distances(simulation, speeds, air=True)
-    fitting = speeds[needed <= room]
-    return float(fitting[-1]) if len(fitting) else float(speeds[0])
+
+    def fits(speed: float) -> bool:
+        stop = stop_distances(simulation, np.array([speed]), air=True)[0]
+        return bool(speed * simulation.period * periods_ahead + stop <= room)
+
+    if fits(cruise):
+        return cruise
+    low, high = _LEAST * cruise, cruise
+    while high - low > _STEP:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low

@@ -59,7 +59,7 @@ def test_surface_belongs_to_the_water():
             np.zeros(12),
             np.zeros(4),
             "boat",
-            "vehicle must be one of 'paper', 'physical', 'hydrone-2021' or a Vehicle, got 'boat'",
+            "vehicle must be one of 'paper', 'physical', 'hydrone-2021', 'hydrone-agile' or a Vehicle, got 'boat'",
         ),
     ],
 )
