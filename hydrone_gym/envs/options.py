@@ -48,7 +48,9 @@ class Options:
     num_obstacles: int = _option(20, "spheres, at most 1000; at least as many as a given scenario has")
     obstacle_radius: tuple[float, float] = _option((0.5, 1.5), "least and greatest radius, m")
     sensor_range: float = _option(3.0, "m")
-    vehicle: str | Vehicle = _option("paper", '"paper", "physical", "hydrone-2021", "hydrone-agile" or a `Vehicle`; kept as the latter')
+    vehicle: str | Vehicle = _option(
+        "paper", '"paper", "physical", "hydrone-2021", "hydrone-agile" or a `Vehicle`; kept as the latter'
+    )
     weather: int | Weather = _option(
         0, "a level, 0 (still air, flat water) to 5, or a `Weather`; kept as the latter; a scenario may carry another"
     )

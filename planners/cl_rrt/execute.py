@@ -163,7 +163,8 @@ def back_up(p, slot, reference):
 def verify_stop(p, first):
     """Check that node `first` can be followed to rest in known free space; write the references to the backup.
 
-    An open or settling node stops by hovering; inside a crossing the stop is the rest of the crossing, then hovering.
+    The stop is a hover on the side of the surface where the vehicle is; inside a crossing, where that is not safe, as
+    much of the crossing as it takes until a hover is.
     Returns the number of references, 0 if the stop fails. With `settings.verify` off every edge passes and is its own
     stop.
     """
@@ -178,22 +179,18 @@ def verify_stop(p, first):
     end = pointer(p.nodes[p.nodes.size - 1])
     copy_vessel(vessel, end)
     node, count = first, 0
-    if p.nodes[first].kind == CROSSING and not p.objective.paper > 0.0:
-        safe, hover = can_hover(p.check, end)
-        if safe:
-            back_up(p, 0, hover)
-            return 1
-    while p.nodes[node].kind == CROSSING:
+    safe, hover = can_hover(p.check, end)
+    while not safe and p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
         if node < 0:  # what comes after it was pruned
             return 0
         reference = reference_of(pointer(p.nodes[node]))
-        safe, _, _ = follow(p.check, end, end, reference)
-        if not safe or count >= BACKUP - 1:
+        on, _, _ = follow(p.check, end, end, reference)
+        if not on or count >= BACKUP - 1:
             return 0
         back_up(p, count, reference)
         count += 1
-    safe, hover = can_hover(p.check, end)
+        safe, hover = can_hover(p.check, end)
     back_up(p, count, hover)
     return count + 1 if safe else 0
 

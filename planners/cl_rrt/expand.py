@@ -23,7 +23,8 @@ GOAL_SAMPLE = 0
 COLUMN_SAMPLE = 1
 CAREFUL_SAMPLE = 2  # near the root, with short steps
 POINT_SAMPLE = 3
-_GOAL_EXTENSION = 60  # edges: a try at the goal may go all the way
+EDGE_TIME = 0.5  # s of an edge, by which limits are counted: shorter periods take more edges to go as far
+_GOAL_EXTENSION = 60  # such edges: a try at the goal may go all the way
 _AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
 _AROUND_SHARE = 0.7
 _ROAM_HEIGHT = 1.5  # m
@@ -201,6 +202,7 @@ def expand_tree(p, size, draws, iterations, roam):
         by_cost = draws[k + 1] < 0.5 and not paper
         step = _CAREFUL_SHARE * p.settings.step if sample.kind == CAREFUL_SAMPLE else p.settings.step
         limit = _GOAL_EXTENSION if sample.kind == GOAL_SAMPLE else int(p.settings.extension)
+        limit = int(limit * EDGE_TIME / p.check.period)
         for _ in range(int(p.settings.tries)):
             i = next_node(p, size, sample, by_cost, iteration)
             if i < 0:

@@ -7,7 +7,7 @@ from hydrone_gym._memory import pointer, view
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.crossing import column_is_free, cross, facing
-from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge
+from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge, zone_edge
 from planners.cl_rrt.references import air_reference, water_reference
 from planners.cl_rrt.tree import OPEN, node_state
 from planners.clearance import clearance_between
@@ -87,7 +87,11 @@ def extend(p, source, size, sample, limit, step):
             if p.nodes[current].goal:
                 break
             continue
-        ended, flown = edge(p, current, size, next_reference(p, current, aim, step), p.margin)
+        reference = next_reference(p, current, aim, step)
+        if p.objective.paper > 0.0:
+            ended, flown = edge(p, current, size, reference, p.margin)
+        else:
+            ended, flown, _ = zone_edge(p, current, size, reference, p.margin)
         if ended == BLOCKED or flown.crossings > 0.0:
             for i in range(first, size):
                 p.nodes[i].unsafe = 1

@@ -13,7 +13,7 @@ from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.simulation import row_at
 from planners.belief import Belief
 from planners.cl_rrt.execute import Constants, Query, cycle
-from planners.cl_rrt.expand import ANY_MEDIUM, CAREFUL, DRAWS, STRAIGHT_ON
+from planners.cl_rrt.expand import ANY_MEDIUM, CAREFUL, DRAWS, EDGE_TIME, STRAIGHT_ON
 from planners.cl_rrt.memory import Memory, Report, first_memory
 from planners.cl_rrt.objective import objective_params
 from planners.cl_rrt.settings import CLRRTSettings
@@ -24,7 +24,7 @@ from planners.policy import Known, Observation, PlannerPolicy, known, whole_numb
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
-_CAREFUL_AFTER, _ANY_MEDIUM_AFTER = 2, 8  # cycles without a path before samples are sought further afield
+_CAREFUL_AFTER, _ANY_MEDIUM_AFTER = 2, 8  # half seconds without a path before samples are sought further afield
 
 
 class CLRRT(PlannerPolicy):
@@ -122,7 +122,7 @@ class CLRRT(PlannerPolicy):
         root = memory.root
         if root >= 0 and np.abs(memory.nodes["state"][root][:3] - start.state[:3]).max() > _MOVED:
             root = -1
-        waiting = memory.waiting
+        waiting = memory.waiting * self.belief.period / EDGE_TIME
         roam = STRAIGHT_ON if waiting < _CAREFUL_AFTER else CAREFUL if waiting < _ANY_MEDIUM_AFTER else ANY_MEDIUM
         size, begin, done = memory.size, True, False
         while not done:

@@ -9,9 +9,12 @@ from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import REFERENCE, Pose
 from planners.stop_check import AIR_GATE, WATER_GATE, inside, state_of
 
-_LEAD = 0.75  # s at cruise speed that the reference may be ahead: one that runs away drags the vehicle through obstacles
+_LEAD = (
+    0.75  # s at cruise speed that the reference may be ahead: one that runs away drags the vehicle through obstacles
+)
 _CLIMB = 0.6  # m of height an edge of 0.5 s may change
 _CARROT_TIME = 1.4  # s of travel ahead under water
+_CLIMB_TIME = 1.0  # s the same in height
 _CARROT_TURNING = 0.6  # m ahead while misaligned: beyond the hold radius, too near to swim an arc
 _ALIGNED = 0.94  # cosine of the misalignment (20 degrees) below which the vehicle turns in place
 
@@ -43,7 +46,7 @@ def water_reference(p, vessel, aim):
     along = abs(dx * cosine + dy * sine) / max(distance, 1e-9)  # the vehicle drives both ways
     ahead = speeds.water * _CARROT_TIME if along > _ALIGNED else _CARROT_TURNING
     scale = min(1.0, ahead / max(distance, 1e-9))
-    climb = speeds.dive * p.check.period * 2.0
+    climb = speeds.dive * _CLIMB_TIME
     rz = min(s.z + clamp(aim.z - s.z, -climb, climb), -WATER_GATE)
     return (
         inside(s.x + scale * dx, w.x_min, w.x_max),

@@ -37,7 +37,7 @@ class CLRRTSettings:
         margin: clearance that planned edges keep, m.
         rest_margin: clearance that the verified stop keeps, m.
         tries: nodes tried in sorted order for one sample.
-        extension: longest extension toward one sample, edges.
+        extension: longest extension toward one sample, edges of half a second.
         max_nodes: size of the tree.
         re_propagate: whether the path chosen is propagated again before it is sent; False only to see what that is for.
         verify: whether an edge must be seen to be followed by a stop; False only to see what it is for.

@@ -22,7 +22,10 @@ OPTIONS = [
     ({"obstacle_radius": (1.0, 9.0)}, "obstacle_radius must be less than 7.5 m, half the shortest edge of the box"),
     ({"sensor_range": 0.0}, "sensor_range must be a positive number (m), got 0.0"),
     ({"sensor_range": math.inf}, "sensor_range must be a positive number (m), got inf"),
-    ({"vehicle": "boat"}, "vehicle must be one of 'paper', 'physical', 'hydrone-2021', 'hydrone-agile' or a Vehicle, got 'boat'"),
+    (
+        {"vehicle": "boat"},
+        "vehicle must be one of 'paper', 'physical', 'hydrone-2021', 'hydrone-agile' or a Vehicle, got 'boat'",
+    ),
     ({"period": 0.33}, "period must be a positive multiple of 0.05 s, got 0.33"),
     ({"period": -0.5}, "period must be a positive number (s), got -0.5"),
     ({"period": "fast"}, "period must be a positive number (s), got 'fast'"),
