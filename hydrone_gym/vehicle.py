@@ -2,7 +2,8 @@
 
 `HYDRONE` is Table 1 of the paper as tabled; `HYDRONE_PHYSICAL` replaces the five entries that contradict physics
 (docs/deviations.md, E4, E6, E8, E14, E15); `HYDRONE_2021` adds what the authors' own simulator of 2021 has
-beyond it; `HYDRONE_AGILE` is `HYDRONE` with gains in air that use the tilt its rotors allow. They are one model: the equations never ask which set they were given.
+beyond it; `HYDRONE_AGILE` is `HYDRONE` with gains in air that use the tilt its rotors allow. They are one model: the
+equations never ask which set they were given.
 """
 
 import dataclasses
@@ -276,9 +277,9 @@ _NAMED = {vehicle.name: vehicle for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRO
 
 
 def named_vehicle(vehicle: str | Vehicle) -> Vehicle:
-    """Return the vehicle that a name stands for ("paper", "physical", "hydrone-2021", "hydrone-agile"), or the vehicle itself.
+    """Return the vehicle that a name stands for, or the vehicle itself.
 
-    Raises ValueError for an unknown name and TypeError for anything else.
+    The names are "paper", "physical", "hydrone-2021" and "hydrone-agile". Raises ValueError for an unknown name and TypeError for anything else.
     """
     if isinstance(vehicle, Vehicle):
         return vehicle

@@ -17,7 +17,7 @@ ARRIVED = 2
 
 CROSSING_SPEED = 0.1  # m/s: a planned crossing is smoother than the one that counts as rough
 CROSSING_COS_TILT = np.cos(np.radians(2.0))
-ZONE_SPEED = 0.13  # m/s: lateral, inside the transition zone, where motion is vertical
+ZONE_SPEED = 0.1  # m/s: lateral, inside the transition zone, where motion is vertical
 
 
 @inlined
