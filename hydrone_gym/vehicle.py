@@ -279,7 +279,8 @@ _NAMED = {vehicle.name: vehicle for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRO
 def named_vehicle(vehicle: str | Vehicle) -> Vehicle:
     """Return the vehicle that a name stands for, or the vehicle itself.
 
-    The names are "paper", "physical", "hydrone-2021" and "hydrone-agile". Raises ValueError for an unknown name and TypeError for anything else.
+    The names are "paper", "physical", "hydrone-2021" and "hydrone-agile". Raises ValueError for an unknown name and
+    TypeError for anything else.
     """
     if isinstance(vehicle, Vehicle):
         return vehicle

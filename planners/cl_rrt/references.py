@@ -9,9 +9,7 @@ from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import REFERENCE, Pose
 from planners.stop_check import AIR_GATE, WATER_GATE, inside, state_of
 
-_LEAD = (
-    0.75  # s at cruise speed that the reference may be ahead: one that runs away drags the vehicle through obstacles
-)
+_LEAD = 0.75  # s at cruise speed it may be ahead: a reference that runs away drags the vehicle through obstacles
 _CLIMB = 0.6  # m of height an edge of 0.5 s may change
 _CARROT_TIME = 1.4  # s of travel ahead under water
 _CLIMB_TIME = 1.0  # s the same in height
