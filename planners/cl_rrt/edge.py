@@ -50,15 +50,17 @@ def edge(p, source, slot, reference, margin):
 
 @routine
 def zone_edge(p, source, slot, reference, margin):
-    """Do what `edge` does, and be BLOCKED also by more lateral speed inside the transition zone than `ZONE_SPEED`.
+    """Do what `edge` does, and be BLOCKED also by a breach of the rule of the zone, where the world has it.
 
-    Returns as third the lateral velocity (x, y in m/s) where it was greatest inside the zone.
+    That is more lateral speed inside the transition zone than `ZONE_SPEED`. Returns as third the lateral velocity
+    (x, y in m/s) where it was greatest inside the zone.
     """
     p.edges[0] += 1.0
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
-    flown, sway = propagate_watched(p.check.lane, start, end, p.check.goal, rounded, p.check.world.zone)
-    fast = sway[0] * sway[0] + sway[1] * sway[1] > ZONE_SPEED * ZONE_SPEED
+    world = p.check.world
+    flown, sway = propagate_watched(p.check.lane, start, end, p.check.goal, rounded, world.zone)
+    fast = world.vertical_mode > 0.0 and sway[0] * sway[0] + sway[1] * sway[1] > ZONE_SPEED * ZONE_SPEED
     return BLOCKED if fast else _judged(flown, margin), flown, sway
 
 
