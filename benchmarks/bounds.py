@@ -71,7 +71,9 @@ def main(a: Arguments) -> None:
     for mission, worlds in bounds.items():
         for name, flights in zip(Bound._fields, zip(*worlds, strict=True), strict=True):
             times, energies = zip(*((f.time, f.energy) for f in flights if f is not None), strict=True)
-            print(f"{mission}, {name}: median {np.median(times):.2f} s, {np.median(energies):.0f} J, {len(times)} worlds")
+            print(
+                f"{mission}, {name}: median {np.median(times):.2f} s, {np.median(energies):.0f} J, {len(times)} worlds"
+            )
 
 
 if __name__ == "__main__":
