@@ -18,7 +18,7 @@ from hydrone_gym._jit import kernel
 from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import Rollout
-from hydrone_gym.simulation.rows import Engine, advance_rows
+from hydrone_gym.simulation.rows import advance_rows
 from hydrone_gym.simulation.simulation import STILL, row_at
 from hydrone_gym.simulation.storage import LANES
 from planners.belief import Belief
@@ -90,8 +90,8 @@ def _planned(belief: Belief, place: Place, seed: int) -> NDArray[np.float64]:
     planner = CLRRT(replace(belief, world=replace(belief.world, sensor_range=EVERYWHERE)), seed=seed)
     rollout, row, memory, sent = Rollout(planner.simulation, place.obstacles), place.row, None, list[Any]()
     for _ in range(int(_LONGEST / belief.period)):
-        vehicle = (row[name][0].copy() for name in ("state", "integral", "reference", "goal"))
-        reference, memory = planner.act(Known(*vehicle, place.obstacles), memory)
+        state, integral, held = (row[name][0].copy() for name in ("state", "integral", "reference"))
+        reference, memory = planner.act(Known(state, integral, held, place.goal, place.obstacles), memory)
         sent.append(reference.astype(np.float32).astype(np.float64))
         if rollout.fly(row, sent[-1]).outcome != RUNNING:
             break
@@ -129,7 +129,7 @@ class _Trial:
 
 
 @kernel
-def _fly(engine: Engine, rows, plans, obstacles, closest, still, zone, lateral) -> None:
+def _fly(engine, rows, plans, obstacles, closest, still, zone, lateral):
     """Fly rows (n,) along plans (K, n, 4); `lateral` (n,) gets the greatest lateral speed within the zone, m/s.
 
     The obstacles (1, 4 M lanes) are the same for all; `zone` is the zone's half-height in m.
@@ -168,12 +168,12 @@ def _improved(
             for k, choice in enumerate(found.argmin(axis=1)):
                 if found[k, choice] < times[k]:
                     plans[k], times[k] = tried[k * found.shape[1] + choice], found[k, choice]
-    best = np.argmin(times)
-    if not math.isfinite(times[best]):
+    fastest = plans[times.argmin()]
+    if not np.isfinite(times).any():
         return None
-    row = trial.fly(plans[best, None])[1][0]
+    row = trial.fly(fastest[None])[1][0]
     time = float(row["ticks"] * TICK)
-    return Found(plans[best, : math.ceil(time / trial.belief.period - 1e-9)], time, float(row["energy"]))
+    return Found(fastest[: math.ceil(time / trial.belief.period - 1e-9)], time, float(row["energy"]))
 
 
 def _varied(plans: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:

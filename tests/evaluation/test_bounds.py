@@ -1,4 +1,4 @@
-"""The frozen bounds: they can be flown again bit for bit, no shipped policy is faster, and they stay with their worlds."""
+"""The frozen bounds: flown again bit for bit, not slower than any shipped policy, and only for their own worlds."""
 
 import gymnasium as gym
 import numpy as np

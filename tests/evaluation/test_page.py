@@ -99,7 +99,8 @@ def made_records(plan):
         time = 120.0 if outcome == "TIMEOUT" else 20.0 + random.random()
         row = replace(row, success=outcome == "GOAL", time=time, energy=50.0 * time, obstacles=obstacles[mission])
         if suite != "mine":
-            row = replace(row, crossings=0, crossing_time=None, lateral_speed=None, tilt=None, vertical_speed=None)
+            none = dict.fromkeys(("crossing_time", "lateral_speed", "tilt", "vertical_speed", "zone_speed"))
+            row = replace(row, crossings=0, **none)
         yield replace(row, clearance=random.random() if suite == "mine" else None)
 
 

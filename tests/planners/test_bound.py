@@ -1,4 +1,4 @@
-"""The search for the bound: what it finds can be flown, keeps the rule it is to keep, and is faster than what it began with."""
+"""The search for the bound: what it finds arrives, keeps the rule it is to keep, and beats what it began with."""
 
 import numpy as np
 import pytest
