@@ -160,7 +160,7 @@ _BOUND = _Kind(
         "Bound: time of the fastest flight that a search found in the world, known in full; no proof that none is "
         f"faster. Over it: median over the worlds that have a bound and were solved; {NONE} where none has.",
         f"Rule of the zone: within ±{LIMITS.zone:g} m of the surface move vertically only. Kept: at most "
-        f"{LIMITS.rough_speed:g} m/s sideways all through it; share of the flights that were there, with its 95 % Wilson interval.",
+        f"{LIMITS.rough_speed:g} m/s sideways all through it; share of these flights, with its 95 % Wilson interval.",
         "Lateral speed in the zone: each flight's largest, median over these flights. Largest: of all flights.",
     ),
 )

@@ -30,19 +30,8 @@ def records():
         quick = {"energy": random.normal(900.0, 50.0), "clearance": random.normal(0.3, 0.2)}
         rows.append(record("quick", world, str(end), 19.0 + random.random(), **quick))
         rows.append(record("safe", world, "GOAL", 21.0 + random.random(), interventions=world % 3))
-        rows.append(
-            record(
-                "lost",
-                world,
-                "TIMEOUT",
-                120.0,
-                crossings=0,
-                lateral_speed=None,
-                tilt=None,
-                zone_speed=None,
-                clearance=None,
-            )
-        )
+        none = dict.fromkeys(("lateral_speed", "tilt", "zone_speed", "clearance"))
+        rows.append(record("lost", world, "TIMEOUT", 120.0, crossings=0, **none))
     return rows
 
 
