@@ -36,19 +36,21 @@ class Arguments:
     """Name of the vehicle."""
     controller: str = "paper"
     """Name of the control law."""
+    effort: int = 1
+    """How much longer than usual to search."""
     jobs: int = 1
     """Worlds at once."""
     out: Path | None = None
     """Folder of the file; that of the suites unless given."""
 
 
-def bound_of(mission: Mission, scenario: Scenario, vehicle: str, controller: str) -> Bound:
-    options: dict[str, Any] = {**mission.options, "vehicle": vehicle, "controller": controller}
+def bound_of(mission: Mission, scenario: Scenario, a: Arguments) -> Bound:
+    options: dict[str, Any] = {**mission.options, "vehicle": a.vehicle, "controller": a.controller}
     env = gym.make(mission.env_id, disable_env_checker=True, **options)
     if env.unwrapped.options.weathered:  # type: ignore[attr-defined]
         raise ValueError(f"mission {mission.name} must be in still weather to be searched")
     place = Place(scenario.start, np.array(scenario.goal), scenario.obstacles)
-    return Bound(*map(_flight, fastest_flights(belief_of(env), place)))
+    return Bound(*map(_flight, fastest_flights(belief_of(env), place, effort=a.effort)))
 
 
 def _flight(found: Found | None) -> BoundFlight | None:
@@ -56,7 +58,7 @@ def _flight(found: Found | None) -> BoundFlight | None:
 
 
 def search(mission: Mission, a: Arguments) -> Iterator[Bound]:
-    worlds = (delayed(bound_of)(mission, scenario, a.vehicle, a.controller) for scenario in mission.scenarios)
+    worlds = (delayed(bound_of)(mission, scenario, a) for scenario in mission.scenarios)
     for world, bound in enumerate(Parallel(n_jobs=a.jobs, return_as="generator")(worlds)):
         told = ("none" if flight is None else f"{flight.time:.2f} s {flight.energy:.0f} J" for flight in bound)
         print(f"{mission.name} {world}: rule kept {', free '.join(told)}", flush=True)
@@ -67,7 +69,7 @@ def main(a: Arguments) -> None:
     suite = load_suite(a.suite).first(a.worlds)
     bounds = {mission.name: list(search(mission, a)) for mission in suite.missions}
     path = bounds_path(suite.name, a.vehicle, a.controller)
-    save_bounds(path if a.out is None else a.out / path.name, a.vehicle, bounds)
+    save_bounds(path if a.out is None else a.out / path.name, bounds)
     for mission, worlds in bounds.items():
         for name, flights in zip(Bound._fields, zip(*worlds, strict=True), strict=True):
             times, energies = zip(*((f.time, f.energy) for f in flights if f is not None), strict=True)

@@ -4,7 +4,6 @@ A file in the package holds those of a suite, a control law and a vehicle: of ea
 the rule of the zone and the fastest of all, with every reference, so that they can be flown again.
 """
 
-import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym.evaluation.suites import FOLDER, load_suite
-from hydrone_gym.vehicle import named_vehicle
 
 GRID = 256.0  # references are stored as multiples of 1/256 m and rad
 _FLIGHTS = ("kept", "free")  # names in a file: with the rule of the zone, and without
@@ -40,9 +38,9 @@ def bounds_path(suite: str, vehicle: str, law: str = "paper") -> Path:
     return FOLDER / f"bounds-{suite}-{vehicle}-{law}.npz"
 
 
-def save_bounds(path: str | os.PathLike[str], vehicle: str, bounds: Mapping[str, Sequence[Bound]]) -> None:
+def save_bounds(path: str | os.PathLike[str], bounds: Mapping[str, Sequence[Bound]]) -> None:
     """Write the bounds of each mission's worlds, in their order; references must be multiples of 1 / `GRID`."""
-    arrays: dict[str, Any] = {"vehicle": np.array(_fingerprint(vehicle))}
+    arrays: dict[str, Any] = {}
     for mission, worlds in bounds.items():
         for name in _FLIGHTS:
             flights = [getattr(bound, name) or BoundFlight(np.nan, np.nan, np.zeros((0, 4))) for bound in worlds]
@@ -55,14 +53,12 @@ def save_bounds(path: str | os.PathLike[str], vehicle: str, bounds: Mapping[str,
 
 
 def load_bounds(suite: str, vehicle: str, law: str = "paper") -> dict[tuple[str, int], Bound]:
-    """Return what is known of a suite, by mission and world: nothing for other vehicles than the file was made for."""
+    """Return what is known of a suite flown by a vehicle under a law, by mission and world; nothing without a file."""
     path, bounds = bounds_path(suite, vehicle, law), dict[tuple[str, int], Bound]()
     if not path.is_file():
         return bounds
     with np.load(path, allow_pickle=False) as arrays:
-        if str(arrays["vehicle"]) != _fingerprint(vehicle):
-            return bounds
-        for mission in dict.fromkeys(name.split("/")[0] for name in arrays.files if "/" in name):
+        for mission in dict.fromkeys(name.partition("/")[0] for name in arrays.files):
             kept, free = (_flights(arrays, f"{mission}/{name}") for name in _FLIGHTS)
             bounds |= {(mission, world): Bound(*pair) for world, pair in enumerate(zip(kept, free, strict=True))}
     return bounds
@@ -73,11 +69,6 @@ def _flights(arrays: Any, name: str) -> list[BoundFlight | None]:
     parts = np.split(arrays[f"{name}/references"] / GRID, np.cumsum(lengths.astype(int))[:-1])
     flights = (BoundFlight(float(t), float(e), part) for t, e, part in zip(times, energies, parts, strict=True))
     return [flight if len(flight.references) else None for flight in flights]
-
-
-def _fingerprint(vehicle: str) -> str:
-    """Return a hash of a vehicle: of all its numbers and gains."""
-    return hashlib.sha256(repr(named_vehicle(vehicle)).encode()).hexdigest()[:16]
 
 
 def bounds_of(arguments: Mapping[str, Any]) -> dict[tuple[str, str, int], Bound]:
