@@ -39,6 +39,11 @@ class Trace(NamedTuple):
         """Whether the controller takes the vehicle to be in air, (N,)."""
         return self.conditions[:, DRIVEN] > 0.0 if self.conditions.size else in_air(self.states[:, 2])
 
+    def zone_speed(self, zone: float) -> float | None:
+        """Return the greatest lateral speed (m/s) within the transition zone of ±`zone` m; None if never there."""
+        there = self.states[np.abs(self.states[:, 2]) <= zone]
+        return float(np.hypot(there[:, 6], there[:, 7]).max()) if len(there) else None
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ending:
@@ -55,6 +60,8 @@ class Ending:
     episode_return: float  #: sum of rewards
     decision_ms: NDArray[np.float64]  #: (K,) wall-clock time of each decision, ms; in a batch its share
     interventions: int | None  #: periods in which a shield flew another reference; None where nothing counts them
+    #: greatest lateral speed within the transition zone, at any tick, m/s; None in a batch, or if never there
+    zone_speed: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,6 +123,7 @@ def fly(env: gym.Env, policy: Policy, *, seed: int | None = None, scenario: Scen
         detected=observation["obstacles"][observation["obstacles"][:, 3] > 0.0],
         decision_ms=np.array(decisions),
         interventions=_interventions(memory),
+        zone_speed=trace.zone_speed(world.simulation.world.zone),
         trace=trace,
     )
 

@@ -36,6 +36,7 @@ class Record:
     lateral_speed: float | None  #: largest at a crossing, m/s
     tilt: float | None  #: largest at a crossing, rad
     vertical_speed: float | None  #: largest at a crossing, either way, m/s
+    zone_speed: float | None  #: largest lateral one within the transition zone, m/s; None in a batch, or if never there
     interventions: int | None  #: periods in which a shield flew another reference; None without a shield
     episode_return: float  #: sum of rewards
     decisions: int  #: periods flown
@@ -93,6 +94,7 @@ def record_of(key: Key, flight: Ending) -> Record:
         crossings=len(crossings),
         crossing_time=float(crossings[0]["time"]) if crossings else None,
         **largest,
+        zone_speed=flight.zone_speed,
         interventions=flight.interventions,
         episode_return=flight.episode_return,
         decisions=len(flight.decision_ms),
@@ -146,7 +148,9 @@ def parse_records(content: bytes, name: str) -> list[Record]:
     """Turn the bytes of a file of rows into records; `name` is what errors call the file."""
     lines = content.split(b"\n")[:-1]
     if lines and lines[0] != HEADER.encode():
-        raise ValueError(f"{name}, line 1: must name the columns {HEADER}")
+        raise ValueError(
+            f"{name}, line 1: must name the columns {HEADER}; what an earlier version flew, fly again (--overwrite)"
+        )
     records = []
     for number, line in enumerate(lines[1:], start=2):
         try:

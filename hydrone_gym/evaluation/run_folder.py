@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hydrone_gym._whole_file import whole
+from hydrone_gym.evaluation.bounds import bounds_of
 from hydrone_gym.evaluation.levels import level_overview, level_tables
 from hydrone_gym.evaluation.plan import Plan
 from hydrone_gym.evaluation.provenance import made_with
@@ -121,11 +122,12 @@ def write_results(
 
     `seconds` is the wall-clock time that all runs took, s.
     """
-    summaries = summarise(records, baseline)
+    arguments = plan.arguments()
+    summaries = summarise(records, baseline, bounds_of(arguments))
     document = {
         "format": f"{FORMAT} summary",
         "version": VERSION,
-        "arguments": {**plan.arguments(), "baseline": summaries[0].baseline},
+        "arguments": {**arguments, "baseline": summaries[0].baseline},
         **made_with(),
         "seconds": seconds,
         "rows": len(records),
@@ -168,7 +170,7 @@ def read_stored(folder: Path) -> Stored:
         _check(document)
         arguments = document["arguments"]
         summed = [(m["suite"], m["mission"], *sorted(p["policy"] for p in m["policies"])) for m in document["missions"]]
-        summaries = summarise(records, arguments["baseline"]) if records else []
+        summaries = summarise(records, arguments["baseline"], bounds_of(arguments)) if records else []
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: damaged: {type(error).__name__}: {error}") from None
     found = [(m.suite, m.mission, *sorted(p.policy for p in m.policies)) for m in summaries]

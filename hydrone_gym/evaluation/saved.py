@@ -165,5 +165,6 @@ def restore(saved: SavedFlight, simulation: Simulation) -> Flight:
         detected=saved.detected,
         decision_ms=np.zeros(0),
         interventions=None,
+        zone_speed=trace.zone_speed(simulation.world.zone),
         trace=trace,
     )

@@ -1,12 +1,13 @@
 """An evaluation in numbers: each policy on each mission, ranked, and how it differs from a baseline on equal worlds."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from hydrone_gym.evaluation.bounds import Bound
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, paired_success, wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
@@ -15,6 +16,7 @@ from hydrone_gym.world.world import World
 ALL_MISSIONS = "all missions"
 BASELINE = "clrrt"  # policy that the others are compared with unless another is named
 LIMITS = World()  # of a rough crossing, the same in every environment
+Bounds = Mapping[tuple[str, str, int], Bound]  # of worlds, by suite, mission and number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +42,11 @@ class PolicySummary:
     lateral_speed_max: float | None  #: the largest of all, m/s
     tilt: Estimate | None  #: likewise, rad
     tilt_max: float | None
+    zone_kept: Estimate | None  #: share of flights in the zone that kept its rule, 95 % Wilson interval; None without
+    zone_speed: float | None  #: of each of those its largest lateral speed in the zone, m/s: median
+    zone_speed_max: float | None  #: the largest of all
+    gap: float | None  #: of its time over the bound, as a share of that: median over the worlds it solved that have one
+    gap_kept: float | None  #: likewise over the bound that keeps the rule of the zone
     interventions: float | None  #: of the shield, mean a flight; None without a shield
     decision_ms_p50: float  #: median over flights of each flight's percentile, ms
     decision_ms_p99: float
@@ -71,10 +78,13 @@ class MissionSummary:
     comparisons: tuple[Comparison, ...]  #: every other policy with the baseline, by rank
 
 
-def summarise(records: Sequence[Record], baseline: str | None = None) -> list[MissionSummary]:
+def summarise(
+    records: Sequence[Record], baseline: str | None = None, bounds: Bounds | None = None
+) -> list[MissionSummary]:
     """Sum up an evaluation, finished or not: for each suite its missions, then all of them together if there are more.
 
     The `baseline` is `BASELINE` unless given, if it flew, else the first policy; ValueError for one that did not fly.
+    `bounds` are those of the worlds, where they have one, see `bounds_of`.
     """
     policies = list(dict.fromkeys(record.policy for record in records))
     if baseline is not None and baseline not in policies:
@@ -87,7 +97,7 @@ def summarise(records: Sequence[Record], baseline: str | None = None) -> list[Mi
         groups = [(name, [record for record in within if record.mission == name]) for name in missions]
         if len(missions) > 1:
             groups.append((ALL_MISSIONS, within))
-        summaries += [_mission(suite, name, group, baseline) for name, group in groups]
+        summaries += [_mission(suite, name, group, baseline, bounds or {}) for name, group in groups]
     return summaries
 
 
@@ -112,9 +122,9 @@ def scores_of(records: Sequence[Record]) -> list[dict[str, Any]]:
     return scores
 
 
-def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str) -> MissionSummary:
+def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str, bounds: Bounds) -> MissionSummary:
     flown = {name: [r for r in records if r.policy == name] for name in dict.fromkeys(r.policy for r in records)}
-    summed = [_policy(name, those) for name, those in flown.items()]
+    summed = [_policy(name, those, bounds) for name, those in flown.items()]
     summed.sort(key=lambda p: (-p.success.value, np.inf if p.time is None else p.time.value))
     compared = {(record.mission, record.world): record for record in flown.get(baseline, [])}
     comparisons = []
@@ -127,14 +137,15 @@ def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str)
     )
 
 
-def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
+def _policy(name: str, records: Sequence[Record], bounds: Bounds) -> PolicySummary:
     arrived = [record for record in records if record.success]
     ends = Counter(record.outcome for record in records)
 
     def there(name: str, among: Sequence[Record] = records) -> list[float]:
         return [getattr(r, name) for r in among if getattr(r, name) is not None]
 
-    interventions, lateral_speed, tilt = map(there, ("interventions", "lateral_speed", "tilt"))
+    told = ("interventions", "lateral_speed", "tilt", "zone_speed")
+    interventions, lateral_speed, tilt, zone_speed = map(there, told)
     crossed = [record for record in records if record.crossings]
     return PolicySummary(
         policy=name,
@@ -156,10 +167,24 @@ def _policy(name: str, records: Sequence[Record]) -> PolicySummary:
         lateral_speed_max=max(lateral_speed, default=None),
         tilt=_estimate(tilt),
         tilt_max=max(tilt, default=None),
+        zone_kept=_share(sum(s <= LIMITS.rough_speed for s in zone_speed), len(zone_speed)) if zone_speed else None,
+        zone_speed=float(np.median(zone_speed)) if zone_speed else None,
+        zone_speed_max=max(zone_speed, default=None),
+        gap=_gap(arrived, bounds, "free"),
+        gap_kept=_gap(arrived, bounds, "kept"),
         interventions=float(np.mean(interventions)) if interventions else None,
         decision_ms_p50=float(np.median(there("decision_ms_p50"))),
         decision_ms_p99=float(np.median(there("decision_ms_p99"))),
     )
+
+
+def _gap(arrived: Sequence[Record], bounds: Bounds, rule: str) -> float | None:
+    """Return the median share by which flights were slower than the bound, with the `rule` of the zone kept or free."""
+    gaps = []
+    for record in arrived:
+        flight = getattr(bounds.get(record.key[:3]), rule, None)
+        gaps += [] if flight is None else [record.time / flight.time - 1.0]
+    return float(np.median(gaps)) if gaps else None
 
 
 def _is_rough(record: Record) -> bool:

@@ -12,7 +12,7 @@ from hydrone_gym.evaluation.summary import LIMITS, Comparison, MissionSummary, P
 from hydrone_gym.rendering.comparison import shortened
 
 _WIDTH = 120  # characters that every table fits in; an overview fits in 80
-_NAME = 22  # characters of a policy in an overview
+_NAME = 21  # characters of a policy in an overview
 NONE = "–"
 _MIDDLE = "interquartile mean (of the middle half) with its 95 % bootstrap interval"
 
@@ -28,7 +28,11 @@ class Table(NamedTuple):
 
 
 def tables_of(summaries: Sequence[MissionSummary]) -> list[Table]:
-    """Return for each mission how flights ended, crossed and decided, what arriving took, and all less the baseline."""
+    """Return tables of each mission.
+
+    They say how flights ended, crossed and decided, what arriving took, how much more that is than the bound, whether
+    the rule of the zone was kept, and all less the baseline.
+    """
     tables = []
     for s in summaries:
         crossed = tuple(p for p in s.policies if p.crossed)
@@ -36,6 +40,7 @@ def tables_of(summaries: Sequence[MissionSummary]) -> list[Table]:
             (_OUTCOMES, s.policies),
             (_CROSSINGS, crossed),
             (_ARRIVED, s.policies),
+            (_BOUND, tuple(p for p in s.policies if p.gap is not None or p.zone_kept is not None)),
             (_DECISIONS, s.policies),
             (_DIFFERENCES, s.comparisons),
         )
@@ -79,6 +84,11 @@ def _measures(p: PolicySummary) -> tuple[str, ...]:
     return (p.policy, cell(p.time, 2), cell(p.length, 1), cell(p.energy, 0))
 
 
+def _bounded(p: PolicySummary) -> tuple[str, ...]:
+    gaps = cell(p.gap, 1, 100.0, "+"), cell(p.gap_kept, 1, 100.0, "+")
+    return (p.policy, *gaps, cell(p.zone_kept, 1, 100.0), cell(p.zone_speed, 3), cell(p.zone_speed_max, 3))
+
+
 def _decision(p: PolicySummary) -> tuple[str, ...]:
     return (p.policy, cell(p.decision_ms_p50, 2), cell(p.decision_ms_p99, 2))
 
@@ -91,10 +101,12 @@ def _difference(c: Comparison) -> tuple[str, ...]:
 
 def _brief(p: PolicySummary) -> tuple[str, ...]:
     others = p.timeouts + p.out_of_bounds + p.diverged
-    counts = map(str, (p.collisions, p.rough_crossings, others))
+    counts = str(p.collisions), f"{p.rough_crossings}/{others}"
     time = None if p.time is None else p.time.value
-    name = shortened(p.policy, _NAME)
-    return (name, cell(p.success, 1, 100.0), *counts, cell(time, 1), cell(p.decision_ms_p99, 2))
+    kept = None if p.zone_kept is None else p.zone_kept.value
+    success = f"{cell(p.success.value, 1, 100.0)} {cell(p.success, 0, 100.0).partition(' ')[2]}"
+    rest = cell(time, 1), cell(p.gap, 0, 100.0, "+"), cell(kept, 0, 100.0), cell(p.decision_ms_p99, 2)
+    return (shortened(p.policy, _NAME), success, *counts, *rest)
 
 
 def cell(value: Estimate | float | None, digits: int, scale: float = 1.0, sign: str = "") -> str:
@@ -137,6 +149,21 @@ _ARRIVED = _Kind(
     _measures,
     (f"Time, length, energy: {_MIDDLE}.",),
 )
+_BOUND = _Kind(
+    "gap to the bound, and the rule of the zone",
+    (
+        *("policy", "over the\nbound (%)", "over the bound\nwith rule (%)", "keeps the rule (%)"),
+        *("lateral speed\nin the zone (m/s)", "largest\n(m/s)"),
+    ),
+    _bounded,
+    (
+        "Bound: time of the fastest flight that a search found in the world, known in full; no proof that none is "
+        f"faster. Over it: median over the worlds that have a bound and were solved; {NONE} where none has.",
+        f"Rule of the zone: within ±{LIMITS.zone:g} m of the surface move vertically only. Kept: at most "
+        f"{LIMITS.rough_speed:g} m/s sideways all through it; share of these flights, with its 95 % Wilson interval.",
+        "Lateral speed in the zone: each flight's largest, median over these flights. Largest: of all flights.",
+    ),
+)
 _DECISIONS = _Kind(
     "decisions of all flights",
     ("policy", "p50 (ms)", "p99 (ms)"),
@@ -156,7 +183,10 @@ _DIFFERENCES = _Kind(
 )
 _OVERVIEW = _Kind(
     "in short",
-    ("policy", "success (%)\n[95 %]", "colli-\nsions", "rough", "other", "time\n(s)", "p99\n(ms)"),
+    (
+        *("policy", "success (%)\n[95 %]", "colli-\nsions", "rough/\nother"),
+        *("time\n(s)", "gap\n(%)", "rule\n(%)", "p99\n(ms)"),
+    ),
     _brief,
     (),
 )

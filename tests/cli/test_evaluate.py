@@ -79,7 +79,7 @@ def test_writes_rows_summary_and_tables(tmp_path, capsys):
     markdown = (tmp_path / "tables.md").read_text()
     for name in ("straight-line", "straight-line-shield", "air-to-water", "water-to-air", "all missions"):
         assert name in markdown
-    assert markdown.count("\n\n- ") == 3 * 5
+    assert markdown.count("\n\n- ") == 3 * 6
     *told, rows, summary, tables, latex = out.splitlines()
     names = ("rows.csv", "summary.json", "tables.md", "tables.tex")
     assert [rows, summary, tables, latex] == [str(tmp_path / name) for name in names]

@@ -26,6 +26,7 @@ ROW = Record(
     lateral_speed=1e-17,
     tilt=0.001,
     vertical_speed=0.5,
+    zone_speed=0.125,
     interventions=None,
     episode_return=-0.25,
     decisions=41,
@@ -67,7 +68,7 @@ def test_the_file_is_csv_for_any_reader(tmp_path):
         ("success", "0", "column outcome: 'GOAL' does not fit success 0"),
         ("outcome", "RUNNING", "column outcome: 'RUNNING' does not fit success 1"),
         ("outcome", "GAOL", "column outcome: 'GAOL' does not fit success 1"),
-        ("decisions", None, "there must be 22 cells, got 21"),
+        ("decisions", None, "there must be 23 cells, got 22"),
     ],
 )
 def test_damage_names_line_and_column(column, cell, message):
@@ -87,7 +88,7 @@ def test_other_damage():
         parse_records(HEADER.encode() + b"\n\xff\xfe\n", "rows.csv")
     with pytest.raises(ValueError, match=r"rows\.csv, line 2: unexpected end of data"):
         parse_records(HEADER.encode() + b'\n"paper-20-v1,\n', "rows.csv")
-    with pytest.raises(ValueError, match=r"rows\.csv, line 2: there must be 22 cells, got 0"):
+    with pytest.raises(ValueError, match=r"rows\.csv, line 2: there must be 23 cells, got 0"):
         parse_records(HEADER.encode() + b"\n\n", "rows.csv")
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hydrone_gym.evaluation.bounds import Bound, BoundFlight
 from hydrone_gym.evaluation.statistics import interquartile_mean, wilson_interval
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, summarise
 from hydrone_gym.evaluation.tables import latex, markdown, overview, print_tables, tables_of
@@ -29,7 +30,8 @@ def records():
         quick = {"energy": random.normal(900.0, 50.0), "clearance": random.normal(0.3, 0.2)}
         rows.append(record("quick", world, str(end), 19.0 + random.random(), **quick))
         rows.append(record("safe", world, "GOAL", 21.0 + random.random(), interventions=world % 3))
-        rows.append(record("lost", world, "TIMEOUT", 120.0, crossings=0, lateral_speed=None, tilt=None, clearance=None))
+        none = dict.fromkeys(("lateral_speed", "tilt", "zone_speed", "clearance"))
+        rows.append(record("lost", world, "TIMEOUT", 120.0, crossings=0, **none))
     return rows
 
 
@@ -121,7 +123,7 @@ def test_an_unknown_baseline_is_refused(records):
 def test_crossings_are_summed_up_over_the_flights_that_crossed():
     speeds, tilts = (0.1, 0.02, 0.3, 0.04), (0.01, 0.1, 0.0, 0.02)  # the third too fast, the second tilted by 5.7°
     rows = [record("x", k, lateral_speed=speeds[k], tilt=tilts[k], crossings=1) for k in range(4)]
-    rows.append(record("x", 4, "TIMEOUT", crossings=0, lateral_speed=None, tilt=None))
+    rows.append(record("x", 4, "TIMEOUT", crossings=0, lateral_speed=None, tilt=None, zone_speed=None))
     rows.append(record("x", 5, "ROUGH_TRANSITION", lateral_speed=0.2, tilt=0.0, crossings=1))  # at the limit, rounded
     (summary,) = summarise(rows)
     (x,) = summary.policies
@@ -142,7 +144,7 @@ def test_crossings_are_summed_up_over_the_flights_that_crossed():
 
 
 def test_what_is_over_all_flights_stands_apart_from_those_that_arrived(records):
-    outcomes, crossings, arrived, decisions, differences = tables_of(summarise(records))
+    outcomes, crossings, arrived, bounded, decisions, differences = tables_of(summarise(records))
     assert arrived.title.endswith(": flights that arrived")
     assert arrived.heads == ("policy", "time (s)", "length (m)", "energy (J)")
     assert decisions.title.endswith(": decisions of all flights")
@@ -151,6 +153,7 @@ def test_what_is_over_all_flights_stands_apart_from_those_that_arrived(records):
         (outcomes, ("Interventions", "Other", "Least clearance", "95 % Wilson interval")),
         (crossings, ("Rough", "Lateral speed, tilt", "95 % bootstrap interval")),
         (arrived, ("interquartile mean", "95 % bootstrap interval")),
+        (bounded, ("Bound", "Rule of the zone: within ±0.8 m", "at most 0.2 m/s sideways")),
         (differences, ("Only it / baseline", "McNemar", "Newcombe's 95 % interval")),
     ):
         assert all(any(word in note for note in table.notes) for word in words)
@@ -178,10 +181,12 @@ def test_an_overview_fits_in_80_columns(monkeypatch, capsys):
     shown = [line for line in lines if " [" in line and line[0] not in " p"] + [x for x in lines if x.startswith("ppo")]
     assert len(shown) == 4  # a line a policy
     assert all(any(line.startswith(name) for line in shown) for name in names[:3])
-    assert any("somewhere/…" in line and "Best+shield" in line for line in shown)
-    assert "100.0 [82.4, 100.0]" in shown[0]
+    assert any("somewhere/…" in line and "est+shield" in line for line in shown)
+    assert "100.0 [82, 100]" in shown[0]
     assert "119.9" in shown[0]
     assert "123.40" in shown[0]
+    assert table.heads[5:7] == ("gap\n(%)", "rule\n(%)")
+    assert table.rows[0][5:7] == ("–", "100")
 
 
 def test_latex_has_every_cell_and_escapes_what_would_break_it(records):
@@ -190,17 +195,17 @@ def test_latex_has_every_cell_and_escapes_what_would_break_it(records):
     assert text.startswith("% \\usepackage{booktabs}\n")
     name = r"50\%\_\&\#\{x\}\$\textasciitilde{}\textasciicircum{}\textbackslash{}"
     assert rf"{name} & 2 & 100.0 [34.2, 100.0] & 0 & 0 & 0 & 0 & $-$0.10 & -- \\" in text
-    assert text.count(r"\begin{tabular}") == text.count(r"\toprule") == text.count(r"\bottomrule") == 5
+    assert text.count(r"\begin{tabular}") == text.count(r"\toprule") == text.count(r"\bottomrule") == 6
     assert r"\shortstack[r]{least clear-\\ance (m)}" in text
     assert r"tilt ($^\circ$)" in text
     assert text.count("{") == text.count("}")
     body = [line for line in text.splitlines() if line.endswith(r" \\") and "shortstack" not in line]
-    assert {line.replace(r"\&", "").count(" & ") for line in body} == {8, 6, 3, 2}
+    assert {line.replace(r"\&", "").count(" & ") for line in body} == {8, 6, 5, 3, 2}
 
 
 def test_tables_show_the_figures(records, capsys):
     summaries = summarise(records)
-    outcomes, _, measures, decisions, differences = tables_of(summaries)
+    outcomes, _, measures, bounded, decisions, differences = tables_of(summaries)
     (quick,) = [entry for entry in summaries[0].policies if entry.policy == "quick"]
     assert outcomes.rows[0][:3] == ("1. safe", "60", "100.0 [94.0, 100.0]")
     assert outcomes.rows[1][:2] == ("2. quick", "60")
@@ -220,9 +225,9 @@ def test_tables_show_the_figures(records, capsys):
     assert lines.count("| 1. safe | 60 | 100.0 [94.0, 100.0] | 0 | 0 | 0 | 0 | 0.50 | 1.0 |") == 1
     for line in lines:
         assert not line or line.startswith(("| ", "### ", "|---|", "- "))
-    print_tables([outcomes, measures, differences])
+    print_tables([outcomes, measures, bounded, differences])
     shown = capsys.readouterr().out
-    for table in (outcomes, measures, differences):
+    for table in (outcomes, measures, bounded, differences):
         for row in table.rows:
             assert any(all(cell in line for cell in row) for line in shown.splitlines())
     assert all(len(line) <= 120 for line in shown.splitlines())
@@ -237,3 +242,32 @@ def test_markdown_escapes_what_would_break_a_table():
 def test_names_are_not_taken_for_markup(capsys):
     print_tables(tables_of(summarise([record("[red]c", 0)])))
     assert "1. [red]c" in capsys.readouterr().out
+
+
+def test_the_gap_is_the_median_over_solved_worlds_that_have_a_bound():
+    def bound(kept, free):
+        return Bound(*(seconds and BoundFlight(seconds, 0.0, np.zeros((1, 4))) for seconds in (kept, free)))
+
+    rows = [record("x", k, time=20.0, mission="a") for k in range(4)] + [record("x", 4, "COLLISION", mission="a")]
+    rows += [record("y", 0, "TIMEOUT", mission="a")]
+    bounds = {(ROW.suite, "a", k): bound(20.0, free) for k, free in enumerate((10.0, 16.0, 8.0))}
+    bounds |= {(ROW.suite, "a", 4): bound(1.0, 1.0), (ROW.suite, "b", 3): bound(1.0, 1.0)}  # not solved, not flown
+    bounds[ROW.suite, "a", 2] = bound(None, 8.0)
+    (summary,) = summarise(rows, bounds=bounds)
+    x, y = summary.policies
+    assert (x.gap, x.gap_kept) == (1.0, 0.0)  # the middle one of 100, 25 and 150 %; the two worlds with 20 s
+    assert (y.gap, y.gap_kept) == (None, None)
+    table = next(t for t in tables_of([summary]) if t.title.endswith("gap to the bound, and the rule of the zone"))
+    assert table.rows[0][1:3] == ("+100.0", "+0.0")
+    assert table.rows[1][1:3] == ("–", "–")
+    assert summarise(rows)[0].policies[0].gap is None
+
+
+def test_the_rule_of_the_zone_is_kept_up_to_its_limit():
+    speeds = (0.05, 0.2, 0.21, 1.5, None)  # the last was never in the zone
+    (summary,) = summarise([record("x", k, zone_speed=speed) for k, speed in enumerate(speeds)])
+    (x,) = summary.policies
+    assert x.zone_kept == (0.5, *wilson_interval(2, 4))
+    assert (x.zone_speed, x.zone_speed_max) == (pytest.approx(0.205), 1.5)
+    table = tables_of([summary])[3]
+    assert table.rows[0][1:] == ("–", "–", "50.0 [15.0, 85.0]", "0.205", "1.500")
