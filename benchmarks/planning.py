@@ -2,6 +2,7 @@
 
     python -m benchmarks.planning                       # six mission types, 20 and 40 spheres, 1,000 worlds each
     python -m benchmarks.planning --worlds 200 --sets experiment-1 experiment-2 --density 20
+    python -m benchmarks.planning --controller robust --crossing aggressive --sets experiment-1 --density 20
 
 World k of a set is drawn from seed k. Every flight goes through the registered environment. Worlds whose flight does
 not end at the goal are saved as scenario files beside the results, named after set, density, seed and outcome.
@@ -51,6 +52,12 @@ class Arguments:
     """Numbers of spheres: 20 of 0.5-1.5 m, or 40 of 0.8-1.8 m radius."""
     vehicle: Literal["paper", "physical", "hydrone-agile"] = "paper"
     """Parameter set."""
+    controller: Literal["paper", "robust"] = "paper"
+    """Control law."""
+    crossing: Literal["vertical", "adaptive", "aggressive"] = "vertical"
+    """What a crossing may be."""
+    period: float = 0.5
+    """Seconds between references."""
     objective: Literal["time", "energy", "length", "paper"] = "time"
     """What the planner minimises."""
     iterations: int = 100
@@ -79,7 +86,9 @@ def law_of(name: str, density: int) -> ScenarioLaw:
 def fly_some(name: str, density: int, seeds: list[int], a: Arguments) -> list[Flown]:
     """Fly the worlds of some seeds; save those that do not end at the goal."""
     vehicle = named_vehicle(a.vehicle)
-    env = gym.make("HydroneGym/Mission-v0", num_obstacles=density, vehicle=a.vehicle, disable_env_checker=True)
+    options: dict[str, Any] = {"vehicle": a.vehicle, "controller": a.controller, "crossing": a.crossing}
+    options |= {"period": a.period, "num_obstacles": density, "disable_env_checker": True}
+    env = gym.make("HydroneGym/Mission-v0", **options)
     planner: Any = CLRRT.for_env(env, iterations=a.iterations, objective=a.objective, latency=a.latency)
     law, flown = law_of(name, density), []
     observation, _ = env.reset(seed=0)
@@ -92,7 +101,7 @@ def fly_some(name: str, density: int, seeds: list[int], a: Arguments) -> list[Fl
         if not record.success:
             folder = a.out.parent / "failed"
             folder.mkdir(parents=True, exist_ok=True)
-            stem = f"{a.vehicle}-{a.objective}-{name}-{density}-{seed}-{record.outcome.lower()}"
+            stem = f"{a.vehicle}-{a.controller}-{a.crossing}-{a.objective}-{name}-{density}-{seed}-{record.outcome.lower()}"
             save_scenario(scenario, folder / f"{stem}.json")
     return flown
 
