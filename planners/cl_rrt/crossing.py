@@ -21,7 +21,6 @@ _BEYOND = 1.3  # m: where the reference goes on the other side
 # Lateral and vertical speed (m/s) at which the vehicle may leave the gate
 _STILL_AIR, _LEVEL_AIR = 0.3, 0.3
 _STILL_WATER, _LEVEL_WATER = 1.0, 0.8
-_APART = 0.12  # m from the column: what is left would pull the vehicle sideways inside the zone
 _HEIGHT = 0.2  # m from the gate
 _FACING = 0.15  # rad
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
@@ -49,7 +48,7 @@ def column_is_free(p, x, y):
 
 
 @inlined
-def at_gate(s, column):
+def at_gate(p, s, column):
     """Whether a vehicle may leave the gate of a column (x, y, gate, psi): too slow to move sideways in the zone.
 
     From below it need not lie still: water brakes it before the zone, and it cannot hold a place sideways anyway.
@@ -59,16 +58,16 @@ def at_gate(s, column):
     still, level = (_STILL_AIR, _LEVEL_AIR) if down else (_STILL_WATER, _LEVEL_WATER)
     slow = s.vx * s.vx + s.vy * s.vy < still * still and abs(s.vz) < level
     dx, dy = s.x - x, s.y - y
-    placed = dx * dx + dy * dy < _APART * _APART and abs(wrap(s.psi - psi)) < _FACING
+    placed = dx * dx + dy * dy < p.settings.apart * p.settings.apart and abs(wrap(s.psi - psi)) < _FACING
     return slow and abs(s.z - gate) < _HEIGHT and (placed or not down)
 
 
 @inlined
 def column_from(p, s, sample):
     """Return the column (x, y, gate, psi) that a vehicle at the gate crosses in: where it stops, turned to go on."""
-    w, goal, down = p.check.world, p.check.goal, is_air(s.z)
+    goal, down = p.check.goal, is_air(s.z)
     ahead = p.check.envelope.stop_time if down else _AHEAD
-    x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
+    x, y, _ = inside(p.check, s.x + ahead * s.vx, s.y + ahead * s.vy, s.z)
     psi = s.psi
     if down:
         psi = facing(x, y, sample.x, sample.y, psi)
@@ -81,7 +80,7 @@ def settle(p, source, size, column):
     """Append edges that come to rest at the gate; return (last node or -1 if they fail, new size)."""
     current = source
     for _ in range(int(_SETTLE_LIMIT / p.check.period)):
-        if at_gate(node_state(p, current), column):
+        if at_gate(p, node_state(p, current), column):
             return current, size
         if size >= p.path.size - 1:
             break

@@ -8,15 +8,12 @@ from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import propagate
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import node_state
-from planners.stop_check import single
+from planners.stop_check import keeps_room, single
 
 # How an edge ended
 BLOCKED = 0
 FREE = 1
 ARRIVED = 2
-
-CROSSING_SPEED = 0.1  # m/s: a planned crossing is smoother than the one that counts as rough
-CROSSING_COS_TILT = np.cos(np.radians(2.0))
 
 
 @routine
@@ -26,15 +23,15 @@ def edge(p, source, slot, reference, margin):
     References are rounded to single precision first, the precision of the action space, so that the environment gets
     the very numbers that were checked.
 
-    Returns (BLOCKED, FREE or ARRIVED, the `Result`). BLOCKED: an obstacle within `margin` m, the bounds, a rough
-    crossing, or divergence.
+    Returns (BLOCKED, FREE or ARRIVED, the `Result`). BLOCKED: an obstacle within `margin` m, a wall, a crossing that is
+    not smoother than one that counts as rough, or divergence.
     """
     p.edges[0] += 1.0
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
     flown = propagate(p.check.lane, start, end, p.check.goal, rounded)
-    rough = flown.lateral_speed > CROSSING_SPEED or flown.cos_tilt < CROSSING_COS_TILT
-    if flown.clearance < margin or rough:
+    rough = flown.lateral_speed > p.settings.crossing_speed or flown.cos_tilt < p.settings.crossing_cos_tilt
+    if flown.clearance < margin or rough or not keeps_room(p.check, end):
         return BLOCKED, flown
     if flown.outcome == GOAL:
         return ARRIVED, flown
