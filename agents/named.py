@@ -4,6 +4,7 @@ from functools import partial
 from typing import Any
 
 from agents.agent import load_agent
+from planners.named import WEATHER
 from planners.shield import Shield
 
 ppo = partial(load_agent, "ppo")
@@ -14,6 +15,11 @@ from_folder = load_agent
 def ppo_shield(env: Any) -> Shield:
     """Return the agent whose training went on behind the shield, behind it."""
     return Shield.for_env(load_agent("ppo-shield", env), env)
+
+
+def ppo_shield_weather(env: Any) -> Shield:
+    """Return the same behind a shield that is ready for weather."""
+    return Shield.for_env(load_agent("ppo-shield", env), env, level=WEATHER)
 
 
 def sac_shield(env: Any) -> Shield:

@@ -101,7 +101,8 @@ def fly_some(name: str, density: int, seeds: list[int], a: Arguments) -> list[Fl
         if not record.success:
             folder = a.out.parent / "failed"
             folder.mkdir(parents=True, exist_ok=True)
-            stem = f"{a.vehicle}-{a.controller}-{a.crossing}-{a.objective}-{name}-{density}-{seed}-{record.outcome.lower()}"
+            kind = f"{a.vehicle}-{a.controller}-{a.crossing}-{a.objective}"
+            stem = f"{kind}-{name}-{density}-{seed}-{record.outcome.lower()}"
             save_scenario(scenario, folder / f"{stem}.json")
     return flown
 

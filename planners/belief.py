@@ -44,9 +44,9 @@ class Belief:
         """The limits of the vehicle."""
         return envelope_of(self.vehicle, self.law)
 
-    def simulation(self, lanes: int = 1) -> Simulation:
-        """Return a simulation of what is believed, with storage of its own."""
-        return Simulation(self.vehicle, self.world, self.period, lanes, self.law)
+    def simulation(self, lanes: int = 1, *, weathered: bool = False) -> Simulation:
+        """Return a simulation of what is believed, in still air and flat water or in weather; with its own storage."""
+        return Simulation(self.vehicle, self.world, self.period, lanes, self.law, weathered)
 
 
 def belief_of(env: Any, belief: Belief | Literal["truth"] | None = None) -> Belief:

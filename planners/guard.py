@@ -10,10 +10,20 @@ from hydrone_gym._memory import gather, pointer, scatter, view
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.clock import TICK
-from hydrone_gym.simulation.rollout import lane_of, with_first
+from hydrone_gym.simulation.rollout import lane_of, of_row
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.world.bodies import BODY, segment_distance
-from planners.stop_check import HELD, MARGIN, Check, goes_on, inside, margin_left, single, state_of, verify
+from planners.stop_check import (
+    HELD,
+    Check,
+    goes_on,
+    inside,
+    margin_left,
+    room_left,
+    single,
+    state_of,
+    verify,
+)
 
 _NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
 
@@ -23,6 +33,10 @@ class GuardQuery(NamedTuple):
 
     rows: np.ndarray  # (n,) dtype `ROW`: state, memory, reference in force and goal
     proposed: NDArray[np.float64]  # (n, 4) references, m and rad
+    eyes: NDArray[np.float64]  # (n, 3) where the spheres were last sensed from, m
+    conditions: NDArray[np.float64]  # (n, CONDITIONS) what each is believed to fly in; (n, 0) without weather
+    margin: float  # clearance to keep, m
+    room: float  # distance to keep from the walls, m
     spheres: NDArray[np.float64]  # (n, 4 M) known ones, unused ones `NOWHERE`
     sent: NDArray[np.float64]  # (n, 4) references to fly, written
     held: NDArray[np.float64]  # (n, 4) hovers verified last, updated
@@ -42,13 +56,13 @@ def _keep_near(spheres, s, near):
 
 
 @inlined
-def _candidate(proposed, s, step, w):
+def _candidate(check, proposed, s, step):
     """Return the reference that a step (scale, turn, lift) makes of the proposed one, for a vehicle at s."""
     scale, (sine, cosine), lift = step[0], sincos(step[1]), step[2]
     dx, dy, dz = proposed.x - s.x, proposed.y - s.y, proposed.z - s.z
-    rx = inside(s.x + scale * (cosine * dx - sine * dy), w.x_min, w.x_max)
-    ry = inside(s.y + scale * (sine * dx + cosine * dy), w.y_min, w.y_max)
-    return rx, ry, inside(s.z + scale * dz + lift, w.z_min, w.z_max), proposed.psi
+    rx, ry = s.x + scale * (cosine * dx - sine * dy), s.y + scale * (sine * dx + cosine * dy)
+    rx, ry, rz = inside(check, rx, ry, s.z + scale * dz + lift)
+    return rx, ry, rz, proposed.psi
 
 
 @inlined
@@ -63,7 +77,7 @@ def _first_safe(check, vessel, proposed, candidates):
     wanted = _four(proposed)
     for k in range(candidates.shape[0] + 1):
         if k > 0:
-            wanted = _candidate(p, s, candidates[k - 1], check.world)
+            wanted = _candidate(check, p, s, candidates[k - 1])
         reference = single(wanted[0], wanted[1], wanted[2], wanted[3])
         safe, hover = verify(check, vessel, reference)
         if safe:
@@ -88,10 +102,11 @@ def guard(query, rollout, envelope, candidates, scratch):
     for n in range(query.rows.size):
         row = query.rows[n]
         vessel, s = pointer(row), state_of(pointer(row))
-        lane = with_first(whole, _keep_near(query.spheres[n], s, whole.obstacles))
-        margin = margin_left(MARGIN, vessel, lane, radius)
-        goal, eye = view(row.goal, 0, Point), view(vessel, 0, Point)
-        check = Check(lane, goal, eye, world, limits, radius, margin, period, pointer(scratch))
+        lane = of_row(whole, _keep_near(query.spheres[n], s, whole.obstacles), pointer(query.conditions[n]))
+        margin = margin_left(query.margin, vessel, lane, radius)
+        room = room_left(query.room, vessel, world)
+        goal, eye = view(row.goal, 0, Point), view(query.eyes[n], 0, Point)
+        check = Check(lane, goal, eye, world, limits, radius, margin, room, period, pointer(scratch))
         query.choice[n], reference, hover = _first_safe(check, vessel, query.proposed[n], candidates)
         if query.choice[n] == HELD:
             query.choice[n], reference = goes_on(check, vessel, _four(query.held[n]))

@@ -29,8 +29,10 @@ from hydrone_gym.simulation.storage import VESSEL, new_rows
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import NOWHERE
 from planners.belief import Belief, belief_of
+from planners.caution import caution_at
+from planners.disturbance import Estimator, Sight
 from planners.guard import GuardQuery, guard
-from planners.policy import KEYS
+from planners.policy import KEYS, Known, known
 from planners.stop_check import AIR_GATE, HELD, RETREAT, WATER_GATE
 
 __all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
@@ -66,6 +68,8 @@ class ShieldState(NamedTuple):
     place: NDArray[np.float64]  # (n, 3) where the vehicle was when it last got away from a place, m
     stayed: NDArray[np.int64]  # (n,) periods with a refusal since; negative while it is sent aside
     detours: NDArray[np.int64]  # (n,) steps aside of this episode
+    sent: NDArray[np.float64]  # (n, 4) references checked last: flown in this period, with latency in the next
+    sights: tuple[Sight | None, ...]  # what the estimator of the disturbance remembers of each; None in still weather
 
 
 class Shield:
@@ -74,26 +78,45 @@ class Shield:
     Args:
         policy: anything with Stable-Baselines3's `predict` on raw observations: agent, planner, or your own.
         belief: the `Belief`, or any model, to check with.
+        level: of the weather to be ready for, 0 to 5. Above 0 it estimates the disturbance from what it observes,
+            checks with that, and keeps farther from everything, see `planners.caution.caution_at`.
+        latency: True to use in each period what was chosen and checked during the one before: the policy is then asked
+            what it would do in the predicted state. For policies that take a whole period.
+
+    Raises:
+        ValueError: no level, a latency that is not True or False.
     """
 
-    def __init__(self, policy: Any, belief: Belief | Any) -> None:
+    def __init__(self, policy: Any, belief: Belief | Any, *, level: int = 0, latency: bool = False) -> None:
         """Make the working storage."""
         self.policy = policy
         self.belief = Belief.of(belief)
-        self.simulation = self.belief.simulation()
+        if not isinstance(latency, bool):
+            raise ValueError(f"latency must be True or False, got {latency!r}")
+        self.caution, self.latency = caution_at(level), latency
+        self.estimator = Estimator(self.belief, weathered=level > 0)
+        self.simulation = self.estimator.simulation
         self._envelope, self._scratch = packed(self.belief.envelope), np.zeros(2 * VESSEL)
         world = self.belief.world
         self._low = np.array([*world.lower, -np.pi], np.float32).astype(np.float64)
         self._high = np.array([*world.upper, np.pi], np.float32).astype(np.float64)
 
     @classmethod
-    def for_env(cls, policy: Any, env: Any, *, belief: Belief | Literal["truth"] | None = None) -> Self:
+    def for_env(
+        cls,
+        policy: Any,
+        env: Any,
+        *,
+        belief: Belief | Literal["truth"] | None = None,
+        level: int = 0,
+        latency: bool = False,
+    ) -> Self:
         """Shield a policy for a HyDrone environment or a vector of them.
 
-        `belief` is what to check with instead of the nominal model, see `planners.belief.belief_of`. Raises TypeError
-        for any other environment.
+        `belief` is what to check with instead of the nominal model, see `planners.belief.belief_of`; the rest is the
+        class's. Raises TypeError for any other environment.
         """
-        return cls(policy, belief_of(env, belief))
+        return cls(policy, belief_of(env, belief), level=level, latency=latency)
 
     def predict(
         self,
@@ -116,31 +139,54 @@ class Shield:
         Raises:
             ValueError: a missing key, a state for another number of environments, a proposal that is not finite.
         """
-        inner = None if state is None else state.policy
-        action, inner = self.policy.predict(observation, inner, episode_start, deterministic)
-        single = np.ndim(action) == 1
-        proposed = np.atleast_2d(np.asarray(action, np.float64))
-        count = len(proposed)
-        in_force = np.reshape(observation["reference"], (-1, 4))
-        positions = np.reshape(observation["state"], (count, -1))[:, :3].astype(np.float64)
-        if state is None:
-            zero = np.zeros(count, np.int64)
-            state = ShieldState(inner, in_force.astype(np.float64), zero, zero, zero, positions, zero, zero)
+        in_force = np.reshape(observation["reference"], (-1, 4)).astype(np.float64)
+        here = np.reshape(observation["state"], (len(in_force), -1))[:, :3].astype(np.float64)
+        state = _first_state(in_force, here) if state is None else state
+        count = len(in_force)
         if len(state.held) != count:
             raise ValueError(f"state holds {len(state.held)} memories for {count} observations")
         starts = np.zeros(count, bool) if episode_start is None else np.reshape(episode_start, count).astype(bool)
+        flown = np.where(starts[:, None], in_force, state.sent)
+        sights = self._look(observation, state, starts)
+        seen = self._ahead(observation, flown, sights) if self.latency else observation
+        action, inner = self.policy.predict(seen, state.policy, episode_start, deterministic)
+        proposed = np.atleast_2d(np.asarray(action, np.float64))
         held = np.where(starts[:, None], in_force, state.held)
-        place, stayed, detours = _watch(positions, starts, state)
+        place, stayed, detours = _watch(here, starts, state)
         aside = stayed < 0
         proposed = np.where(aside[:, None], _beside(place, in_force, detours), proposed)
-        sent, held, choice = self.check(observation, proposed, held)
+        sent, held, choice = self.check(seen, proposed, held, eyes=here, sights=sights)
         interventions = np.where(starts, 0, state.interventions) + ((choice != 0) | aside)
         periods = np.where(starts, 0, state.periods) + 1
-        new = ShieldState(inner, held, choice, interventions, periods, place, stayed, detours)
-        return (sent[0] if single else sent).astype(np.float32), new
+        new = ShieldState(inner, held, choice, interventions, periods, place, stayed, detours, sent, sights)
+        return np.reshape(flown if self.latency else sent, np.shape(action)).astype(np.float32), new
+
+    def _look(
+        self, observation: Mapping[str, NDArray], state: ShieldState, starts: NDArray[np.bool_]
+    ) -> tuple[Sight | None, ...]:
+        """Return what the estimator makes of each observation."""
+        if not self.simulation.weathered:
+            return (None,) * len(starts)
+        before = [None if begins else sight for begins, sight in zip(starts, state.sights, strict=True)]
+        return tuple(self.estimator.look(now, sight) for now, sight in zip(_each(observation), before, strict=True))
+
+    def _ahead(
+        self, observation: Mapping[str, NDArray], sending: NDArray[np.float64], sights: tuple[Sight | None, ...]
+    ) -> dict[str, NDArray]:
+        """Predict the observations a period later, with references (n, 4) sent now; of spheres nothing new is known."""
+        told = zip(_each(observation), sending, sights, strict=True)
+        later = [self.estimator.ahead(*each) for each in told]
+        new = {key: np.stack([getattr(known, key) for known in later]) for key in ("state", "integral", "reference")}
+        return {**observation, **{key: np.reshape(new[key], np.shape(observation[key])) for key in new}}
 
     def check(
-        self, observation: Mapping[str, NDArray], proposed: NDArray[np.float64], held: NDArray[np.float64]
+        self,
+        observation: Mapping[str, NDArray],
+        proposed: NDArray[np.float64],
+        held: NDArray[np.float64],
+        *,
+        eyes: NDArray[np.float64] | None = None,
+        sights: tuple[Sight | None, ...] | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
         """Check references (n, 4) against observations; nothing given is changed.
 
@@ -148,6 +194,8 @@ class Shield:
             observation: raw Dict observation, single or batched.
             proposed: (n, 4) references, m and rad; clipped to the box as the environment does.
             held: (n, 4) hovers verified last; the references in force where an episode begins.
+            eyes: (n, 3) where the spheres were last sensed from, m; where the vehicles are, unless given.
+            sights: what the estimator remembers of each; no disturbance is believed in unless given.
 
         Returns:
             References to fly (n, 4), the new `held` (n, 4), and choices (n,).
@@ -166,17 +214,35 @@ class Shield:
             rows[key] = np.reshape(observation[key], rows[key].shape)
         spheres = np.array(observation["obstacles"], np.float64, order="C").reshape(count, -1, 4)
         spheres[spheres[:, :, 3] <= 0.0] = NOWHERE
+        conditions = [self.estimator.conditions(sight) for sight in sights or (None,) * count]
         query = GuardQuery(
             rows=rows,
+            eyes=np.ascontiguousarray(rows["state"][:, :3]) if eyes is None else np.array(eyes, np.float64, order="C"),
+            conditions=np.array(conditions),
+            margin=self.caution.margin,
+            room=self.caution.room,
             proposed=np.ascontiguousarray(np.minimum(np.maximum(proposed, self._low), self._high)),
             spheres=spheres.reshape(count, -1),
             sent=np.empty((count, 4)),
             held=np.array(held, np.float64, order="C"),
             choice=np.empty(count, np.int64),
         )
-        rollout = Rollout(self.simulation, np.empty((spheres.shape[1], 4))).memory
-        guard(query, rollout, self._envelope, CANDIDATES, self._scratch)
+        rollout = Rollout(self.simulation, np.empty((spheres.shape[1], 4)), self.estimator.conditions(None))
+        guard(query, rollout.memory, self._envelope, CANDIDATES, self._scratch)
         return query.sent, query.held, query.choice
+
+
+def _first_state(in_force: NDArray[np.float64], here: NDArray[np.float64]) -> ShieldState:
+    """Return what is remembered when episodes begin."""
+    count = len(here)
+    zero = np.zeros(count, np.int64)
+    return ShieldState(None, in_force, zero, zero, zero, here, zero, zero, in_force, (None,) * count)
+
+
+def _each(observation: Mapping[str, NDArray]) -> list[Known]:
+    """Return what is known in each environment of an observation, single or batched."""
+    single = np.ndim(observation["state"]) == 1
+    return [known(observation, None if single else k) for k in range(1 if single else len(observation["state"]))]
 
 
 def _watch(

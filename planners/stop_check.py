@@ -36,6 +36,7 @@ _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
 _DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
+_CARRIED = 2.0  # s: the same in a current, which moves on what has been looked at for as long as a stop is
 _WALL = 0.1  # m: references keep this far inside the box
 
 
@@ -49,14 +50,39 @@ class Check(NamedTuple):
     envelope: Any  # view of an `Envelope`
     radius: float  # of the vehicle, m
     margin: float  # clearance to keep, m
+    room: float  # m that a vehicle keeps from the walls, and its references more by `_WALL`
     period: float  # s
     scratch: Any  # pointer to room for two vessels
 
 
 @inlined
-def inside(value, low, high):
-    """Keep a coordinate of a reference inside the box."""
-    return clamp(value, low + _WALL, high - _WALL)
+def inside(check, x, y, z):
+    """Keep the place of a reference inside the box."""
+    w, wall = check.world, _WALL + check.room
+    return (
+        clamp(x, w.x_min + wall, w.x_max - wall),
+        clamp(y, w.y_min + wall, w.y_max - wall),
+        clamp(z, w.z_min + wall, w.z_max - wall),
+    )
+
+
+@inlined
+def _within(w, s, room):
+    """Whether a place keeps its distance from the walls; with none to keep, that is for the outcome to say."""
+    across = s.x - w.x_min >= room and w.x_max - s.x >= room and s.y - w.y_min >= room and w.y_max - s.y >= room
+    return room == 0.0 or (across and s.z - w.z_min >= room and w.z_max - s.z >= room)
+
+
+@inlined
+def keeps_room(check, vessel):
+    """Whether a vehicle keeps its distance from the walls."""
+    return _within(check.world, state_of(vessel), check.room)
+
+
+@inlined
+def room_left(wanted, vessel, world):
+    """The distance to keep from the walls (m): the wanted one, or none for a vehicle that is already nearer."""
+    return wanted if _within(world, state_of(vessel), wanted) else 0.0
 
 
 @inlined
@@ -113,14 +139,14 @@ def sensed(check, vessel):
 @inlined
 def hover_reference(check, vessel):
     """Anchor a hover at the vehicle, a little ahead along its velocity: the safety action."""
-    w, s = check.world, state_of(vessel)
+    s = state_of(vessel)
     air = is_air(s.z)
     ahead = check.envelope.ahead_air if air else check.envelope.ahead_water
     psi = view(vessel, REFERENCE, Pose).psi if air else s.psi
     z = s.z + ahead * s.vz
     z = max(z, AIR_GATE) if air else min(z, -WATER_GATE)
-    x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
-    return single(x, y, inside(z, w.z_min, w.z_max), psi)
+    x, y, z = inside(check, s.x + ahead * s.vx, s.y + ahead * s.vy, z)
+    return single(x, y, z, psi)
 
 
 @routine
@@ -130,37 +156,49 @@ def follow(check, start, end, reference):
     smooth = flown.lateral_speed <= check.world.rough_speed and flown.cos_tilt >= check.world.rough_cos_tilt
     arrives = flown.outcome == GOAL
     on = flown.outcome == RUNNING or arrives
-    safe = on and flown.clearance >= check.margin and smooth and sensed(check, end)
+    safe = on and flown.clearance >= check.margin and smooth and keeps_room(check, end) and sensed(check, end)
     return safe, arrives, flown.crossings > 0.0
 
 
 @inlined
-def _resting(check, s, hover):
-    """Whether a state that a hover has been flown to for a period stays: slow, level, not about to drive."""
+def _slow(s):
+    return s.vx * s.vx + s.vy * s.vy + s.vz * s.vz < _REST * _REST
+
+
+@inlined
+def _resting(check, s, hover, was_slow):
+    """Whether a state that a hover has been flown to for a period stays: slow, level, not about to drive.
+
+    In wind a vehicle at rest leans as much as the wind pushes. There it is level enough if it did not gain speed.
+    """
     dx, dy, hold = hover[0] - s.x, hover[1] - s.y, check.envelope.hold_radius
-    slow = s.vx * s.vx + s.vy * s.vy + s.vz * s.vz < _REST * _REST
-    level = s.phi * s.phi + s.theta * s.theta + s.p * s.p + s.q * s.q < _LEVEL * _LEVEL
-    return slow and level and abs(s.z) > check.world.zone and (is_air(s.z) or dx * dx + dy * dy < hold * hold)
+    tilt2 = s.phi * s.phi + s.theta * s.theta
+    tilt2 = 0.0 if check.lane.weathered > 0 and was_slow else tilt2
+    level = tilt2 + s.p * s.p + s.q * s.q < _LEVEL * _LEVEL
+    return _slow(s) and level and abs(s.z) > check.world.zone and (is_air(s.z) or dx * dx + dy * dy < hold * hold)
 
 
 @routine
 def rests(check, vessel, hover, seconds):
     """Whether a vessel comes to rest safely at a hover within some time; it is flown in place.
 
-    It passes the surface only if the hover lies on the other side.
+    It passes the surface only if the hover lies on the other side. In a current nothing rests under water: there it is
+    enough that the vehicle is safe all that time and, carried on, for a while after.
     """
     resting, stays = False, is_air(state_of(vessel).z) == is_air(hover[2])
     for _ in range(int(np.ceil(seconds / check.period))):
+        was_slow = _slow(state_of(vessel))
         safe, arrives, crosses = follow(check, vessel, vessel, hover)
         if arrives or not safe or (crosses and stays):
             return safe and not (crosses and stays)
-        resting = _resting(check, state_of(vessel), hover)
+        resting = _resting(check, state_of(vessel), hover, was_slow)
         if resting:
             break
     s, w = state_of(vessel), check.world
     if is_air(s.z):
         return resting
-    x, y = s.x + _DRIFT * s.vx, s.y + _DRIFT * s.vy
+    drift = _DRIFT if resting or check.lane.weathered == 0 else _CARRIED
+    x, y = s.x + drift * s.vx, s.y + drift * s.vy
     if not (w.x_min < x < w.x_max and w.y_min < y < w.y_max):
         return False
     return clearance_between((s.x, s.y, s.z), (x, y, s.z), check.lane, 0, check.radius) >= check.margin
@@ -213,18 +251,14 @@ def goes_on(check, vessel, held):
     copy_vessel(vessel, spare)
     if rests(check, spare, held, _RETREAT_AHEAD):
         return HELD, held
-    near = Check(
-        check.lane, check.goal, check.eye, w, check.envelope, check.radius, LEAST_MARGIN, check.period, check.scratch
-    )
+    lane, envelope, period = check.lane, check.envelope, check.period
+    near = Check(lane, check.goal, check.eye, w, envelope, check.radius, LEAST_MARGIN, 0.0, period, check.scratch)
     scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)
     for turn in _TURNS:
         sine, cosine = sincos(turn)
-        back = single(
-            inside(s.x + scale * (cosine * s.vx - sine * s.vy), w.x_min, w.x_max),
-            inside(s.y + scale * (sine * s.vx + cosine * s.vy), w.y_min, w.y_max),
-            inside(min(s.z, -WATER_GATE), w.z_min, w.z_max),
-            s.psi,
-        )
+        x, y = s.x + scale * (cosine * s.vx - sine * s.vy), s.y + scale * (sine * s.vx + cosine * s.vy)
+        x, y, z = inside(check, x, y, min(s.z, -WATER_GATE))
+        back = single(x, y, z, s.psi)
         copy_vessel(vessel, spare)
         if rests(near, spare, back, _RETREAT_AHEAD):
             return RETREAT, back

@@ -106,6 +106,8 @@ EXTRA = size_of(Conditions)  # a disturbance's numbers
 CONDITIONS = EXTRA + MOST
 _EXTRA_OF_CLIMATE = size_of(Climate)
 _FLUID = offsets_of(Fluid)
+_HEADINGS = AT.headings + np.arange(4)  # of wind and current
+_WEIGHTS = np.array([AT.vehicle + getattr(offsets_of(VehicleParams), medium) for medium in ("air", "water")])
 
 
 def climate_of(vehicle: Vehicle, weather: Weather, spread: Spread, depth: float) -> np.ndarray:
@@ -193,6 +195,38 @@ def key_of(generator: np.random.Generator) -> tuple[float, float]:
     child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, _WEATHER))
     low, high = child.generate_state(2).tolist()
     return float(low), float(high)
+
+
+class Steady(NamedTuple):
+    """A disturbance that does not change: what planners believe in."""
+
+    wind_x: float  # of the air, m/s
+    wind_y: float
+    push_air: float  # upward force on the vehicle in air, N
+    water_x: float  # of the water, m/s
+    water_y: float
+    push_water: float  # the same in water
+
+
+def still_conditions(vehicle: Vehicle) -> NDArray[np.float64]:
+    """Return the conditions (CONDITIONS,) of one lane in which a vehicle flies in still air and flat water.
+
+    Its rotors follow at once and the medium is noticed at once, whatever the vehicle's are: what a flight would have to
+    remember of them is not in its state.
+    """
+    hull = hull_of(vehicle)._replace(rotor_lag_air=0.0, rotor_lag_water=0.0, medium_delay=0.0)
+    none = unpacked(Conditions, np.zeros(EXTRA))
+    wind, current = none.wind._replace(speed=1.0), none.current._replace(speed=1.0)  # times headings of no length
+    still = none._replace(vehicle=params_of(hull), real=unmodelled_of(hull, DT), wind=wind, current=current)
+    return np.concatenate([packed(still), np.zeros(MOST)])
+
+
+def steady_conditions(still: NDArray[np.float64], steady: Steady) -> NDArray[np.float64]:
+    """Return conditions from `still_conditions` under a `Steady` disturbance."""
+    conditions = still.copy()
+    conditions[_HEADINGS] = steady.wind_x, steady.wind_y, steady.water_x, steady.water_y
+    conditions[_WEIGHTS] -= steady.push_air, steady.push_water
+    return conditions
 
 
 def weather_at(conditions: NDArray[np.float64], lanes: int, count: int) -> dict[str, NDArray[np.float64]]:

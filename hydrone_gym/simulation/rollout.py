@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 
 from hydrone_gym._jit import inlined, kernel, routine
 from hydrone_gym._memory import call, gather, pointer, scatter, view
+from hydrone_gym.physics.immersion import Fluid
 from hydrone_gym.physics.kinematics import State
 from hydrone_gym.simulation.clock import TICK
+from hydrone_gym.simulation.conditions import AT as CONDITIONS_AT
+from hydrone_gym.simulation.conditions import Noticed
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.rows import Engine, advance_rows, set_move
 from hydrone_gym.simulation.simulation import STILL, Simulation
@@ -34,6 +37,7 @@ from hydrone_gym.simulation.storage import (
     Pose,
     new_block,
 )
+from hydrone_gym.surface import is_air
 
 
 class Result(NamedTuple):
@@ -58,6 +62,8 @@ class Lane(NamedTuple):
     obstacles: Any  # flat: x, y, z, r in m
     closest: Any
     number: int  # of obstacles
+    weather: Any  # `Conditions`
+    weathered: int  # how many numbers they are; 0 without weather
 
 
 def _check_lanes(simulation: Simulation, lanes: int) -> None:
@@ -71,11 +77,21 @@ class Rollout:
     Args:
         simulation: of one lane: vehicle, world, law and period.
         obstacles: (M, 4) spheres x, y, z, r in m, those that are known.
+        conditions: (CONDITIONS,) of a simulation with weather, as from `steady_conditions`; at the beginning of every
+            period the medium is noticed.
     """
 
-    def __init__(self, simulation: Simulation, obstacles: NDArray[np.float64]) -> None:
-        """Lay out the obstacles; ValueError for a simulation of many lanes."""
+    def __init__(
+        self,
+        simulation: Simulation,
+        obstacles: NDArray[np.float64],
+        conditions: NDArray[np.float64] = STILL[0],
+    ) -> None:
+        """Lay out the obstacles; ValueError for many lanes, and for weather without conditions or the reverse."""
         _check_lanes(simulation, 1)
+        if simulation.weathered != (conditions.size > 0):
+            raise ValueError(f"a simulation with weathered={simulation.weathered} got {conditions.size} conditions")
+        self._conditions = np.array(conditions, np.float64)
         self._engine = simulation.engine._replace(block=new_block(1))
         self._obstacles = np.array(obstacles, np.float64).reshape(-1)
         self._closest = np.zeros(len(obstacles))
@@ -85,9 +101,9 @@ class Rollout:
         raise TypeError("a Rollout cannot be pickled: send the simulation and make it anew")
 
     @property
-    def memory(self) -> tuple[Engine, NDArray[np.float64], NDArray[np.float64]]:
+    def memory(self) -> tuple[Engine, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """What kernels take; `lane_of` makes a `Lane` of it."""
-        return self._engine, self._obstacles, self._closest
+        return self._engine, self._obstacles, self._closest, self._conditions
 
     def fly(self, row: np.ndarray, reference: NDArray[np.float64]) -> Result:
         """Fly a row (1,) of dtype `ROW` for one period toward a reference (4,), in place; m, m, m, rad.
@@ -100,7 +116,7 @@ class Rollout:
 @inlined
 def lane_of(memory):
     """Make a `Lane` of a rollout's memory."""
-    engine, obstacles, closest = memory
+    engine, obstacles, closest, conditions = memory
     return Lane(
         engine.address,
         engine.ticks,
@@ -109,13 +125,16 @@ def lane_of(memory):
         pointer(obstacles),
         pointer(closest),
         closest.size,
+        pointer(conditions),
+        conditions.size,
     )
 
 
 @inlined
-def with_first(lane, number):
-    """The same rollout with the first so many of its obstacles."""
-    return Lane(lane.address, lane.ticks, lane.values, lane.block, lane.obstacles, lane.closest, number)
+def of_row(lane, number, weather):
+    """The same rollout with the first so many of its obstacles, in other weather: a pointer to `Conditions`."""
+    at, ticks, values, block = lane.address, lane.ticks, lane.values, lane.block
+    return Lane(at, ticks, values, block, lane.obstacles, lane.closest, number, weather, lane.weathered)
 
 
 @inlined
@@ -128,6 +147,16 @@ def _take_off(lane, start, goal, reference):
     scatter(b, GOAL, 0, 1, gather(goal, 0, 0, 1, Point))
     scatter(b, AT.episode, 0, 1, Episode(0.0, np.inf, np.float64(RUNNING), 0.0))
     set_move(b, 0, 1, Pose(reference[0], reference[1], reference[2], reference[3]))
+    if lane.weathered > 0:
+        air = 1.0 if is_air(gather(start, 0, 0, 1, Point).z) else 0.0
+        scatter(lane.weather, CONDITIONS_AT.noticed, 0, 1, Noticed(air, air, 0.0, 0.0))
+
+
+@inlined
+def _fly(lane, first, last):
+    """Fly the vehicle that took off through ticks [first, last) of a period."""
+    around = (lane.obstacles, lane.closest, lane.weather, lane.values, lane.number)
+    call(lane.address, lane.block, *around, first, last, lane.ticks)
 
 
 @inlined
@@ -156,8 +185,7 @@ def propagate(lane, start, end, goal, reference):
         reference: (x, y, z, psi), m and rad.
     """
     _take_off(lane, start, goal, reference)
-    b, ticks = lane.block, lane.ticks
-    call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, 0, ticks, ticks)
+    _fly(lane, 0, lane.ticks)
     return _land(lane, end, reference)
 
 
@@ -165,15 +193,20 @@ def propagate(lane, start, end, goal, reference):
 def propagate_watched(lane, start, end, goal, reference, zone):
     """Do what `propagate` does, bit for bit, and look at every tick.
 
-    Returns the `Result`, and the lateral velocity (x, y in m/s) where it was greatest within `zone` m of the surface.
+    Returns the `Result`, and the lateral velocity through the water (x, y in m/s) where it was greatest within `zone` m
+    of the surface.
     """
     _take_off(lane, start, goal, reference)
-    b, ticks, vx, vy = lane.block, lane.ticks, 0.0, 0.0
-    for tick in range(ticks):
-        call(lane.address, b, lane.obstacles, lane.closest, b, lane.values, lane.number, tick, tick + 1, ticks)
-        s = view(b, 0, State)
-        if abs(s.z) <= zone and s.vx * s.vx + s.vy * s.vy > vx * vx + vy * vy:
-            vx, vy = s.vx, s.vy
+    vx, vy = 0.0, 0.0
+    for tick in range(lane.ticks):
+        _fly(lane, tick, tick + 1)
+        s = view(lane.block, 0, State)
+        sx, sy = s.vx, s.vy
+        if lane.weathered > 0:
+            fluid = gather(lane.weather, CONDITIONS_AT.fluid, 0, 1, Fluid)
+            sx, sy = sx - fluid.water_x, sy - fluid.water_y
+        if abs(s.z) <= zone and sx * sx + sy * sy > vx * vx + vy * vy:
+            vx, vy = sx, sy
     return _land(lane, end, reference), (vx, vy)
 
 

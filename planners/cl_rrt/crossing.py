@@ -59,9 +59,9 @@ def column_is_free(p, x, y):
 @inlined
 def column_from(p, s, sample):
     """Return the column (x, y, gate, psi) that a vehicle at the gate crosses in: where it stops, turned to go on."""
-    w, goal, down = p.check.world, p.check.goal, is_air(s.z)
+    goal, down = p.check.goal, is_air(s.z)
     ahead = p.check.envelope.stop_time if down else _AHEAD
-    x, y = inside(s.x + ahead * s.vx, w.x_min, w.x_max), inside(s.y + ahead * s.vy, w.y_min, w.y_max)
+    x, y, _ = inside(p.check, s.x + ahead * s.vx, s.y + ahead * s.vy, s.z)
     psi = s.psi
     if down:
         psi = facing(x, y, sample.x, sample.y, psi)
@@ -146,13 +146,13 @@ def _enter(p, source, size, column, onward):
     w, s, down = p.check.world, node_state(p, source), is_air(column[2])
     speed2 = s.vx * s.vx + s.vy * s.vy
     if not down:  # water brakes whoever rises: at most a period before the zone
-        x, y = inside(s.x + _AHEAD * s.vx, w.x_min, w.x_max), inside(s.y + _AHEAD * s.vy, w.y_min, w.y_max)
+        x, y, _ = inside(p.check, s.x + _AHEAD * s.vx, s.y + _AHEAD * s.vy, s.z)
         return _through(p, source, size, (x, y, column[2], column[3]), onward)[0]
     if speed2 < _STILL * _STILL:
         return _through(p, source, size, column, onward)[0]
     if w.vertical_mode == 0.0:  # the law slows down before the surface by itself
         for lead in _LEADS:
-            x, y = inside(s.x + lead * s.vx, w.x_min, w.x_max), inside(s.y + lead * s.vy, w.y_min, w.y_max)
+            x, y, _ = inside(p.check, s.x + lead * s.vx, s.y + lead * s.vy, s.z)
             grown = _through(p, source, size, (x, y, column[2], column[3]), onward)[0]
             if grown > size:
                 return grown
@@ -162,7 +162,7 @@ def _enter(p, source, size, column, onward):
     low, high = -_LEAD, _LEAD
     for _ in range(_BISECTIONS):
         lead = 0.5 * (low + high)
-        x, y = inside(s.x + lead * s.vx, w.x_min, w.x_max), inside(s.y + lead * s.vy, w.y_min, w.y_max)
+        x, y, _ = inside(p.check, s.x + lead * s.vx, s.y + lead * s.vy, s.z)
         grown, sway = _through(p, source, size, (x, y, column[2], column[3]), onward)
         if grown > size:
             return grown
@@ -232,7 +232,8 @@ def cross(p, source, size, sample):
             for share in _BRAKE_SHARES:
                 x = share * old.x + (1.0 - share) * (s.x + _BRAKE_LEAD * s.vx)
                 y = share * old.y + (1.0 - share) * (s.y + _BRAKE_LEAD * s.vy)
-                brake = inside(x, w.x_min, w.x_max), inside(y, w.y_min, w.y_max), height, column[3]
+                x, y, _ = inside(p.check, x, y, height)
+                brake = x, y, height, column[3]
                 grown = _settle(p, source, size, brake, onward, _BRAKE)
                 if grown > size:
                     return grown

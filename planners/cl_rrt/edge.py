@@ -8,28 +8,23 @@ from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import propagate, propagate_watched
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import node_state
-from planners.stop_check import single
+from planners.stop_check import keeps_room, single
 
 # How an edge ended
 BLOCKED = 0
 FREE = 1
 ARRIVED = 2
 
-CROSSING_SPEED = 0.1  # m/s: a planned crossing is smoother than the one that counts as rough
-CROSSING_COS_TILT = np.cos(np.radians(2.0))
 SMOOTH = 0.9  # share of a rough crossing's speed and tilt, where motion in the zone need not be vertical
-ZONE_SPEED = 0.1  # m/s: lateral, inside the transition zone, where motion is vertical
 
 
 @inlined
-def _judged(p, flown, margin):
-    """Return how an edge ended: BLOCKED, FREE or ARRIVED."""
-    w, vertical = p.check.world, p.check.world.vertical_mode > 0.0
-    fast = flown.lateral_speed > (CROSSING_SPEED if vertical else SMOOTH * w.rough_speed)
-    rough = fast or flown.cos_tilt < (
-        CROSSING_COS_TILT if vertical else 1.0 - SMOOTH * SMOOTH * (1.0 - w.rough_cos_tilt)
-    )
-    if flown.clearance < margin or rough:
+def _judged(p, end, flown, margin):
+    """Return how an edge to a vessel ended: BLOCKED, FREE or ARRIVED."""
+    w, o, vertical = p.check.world, p.settings, p.check.world.vertical_mode > 0.0
+    fast = flown.lateral_speed > (o.crossing_speed if vertical else SMOOTH * w.rough_speed)
+    level = o.crossing_cos_tilt if vertical else 1.0 - SMOOTH * SMOOTH * (1.0 - w.rough_cos_tilt)
+    if flown.clearance < margin or fast or flown.cos_tilt < level or not keeps_room(p.check, end):
         return BLOCKED
     if flown.outcome == GOAL:
         return ARRIVED
@@ -43,30 +38,30 @@ def edge(p, source, slot, reference, margin):
     References are rounded to single precision first, the precision of the action space, so that the environment gets
     the very numbers that were checked.
 
-    Returns (BLOCKED, FREE or ARRIVED, the `Result`). BLOCKED: an obstacle within `margin` m, the bounds, a rough
-    crossing, or divergence.
+    Returns (BLOCKED, FREE or ARRIVED, the `Result`). BLOCKED: an obstacle within `margin` m, a wall, a crossing that is
+    not smoother than one that counts as rough, or divergence.
     """
     p.edges[0] += 1.0
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
     flown = propagate(p.check.lane, start, end, p.check.goal, rounded)
-    return _judged(p, flown, margin), flown
+    return _judged(p, end, flown, margin), flown
 
 
 @routine
 def zone_edge(p, source, slot, reference, margin):
     """Do what `edge` does, and be BLOCKED also by a breach of the rule of the zone, where the world has it.
 
-    That is more lateral speed inside the transition zone than `ZONE_SPEED`. Returns as third the lateral velocity
-    (x, y in m/s) where it was greatest inside the zone.
+    That is more lateral speed inside the transition zone than a planned crossing may have. Returns as third the
+    lateral velocity through the water (x, y in m/s) where it was greatest inside the zone.
     """
     p.edges[0] += 1.0
     start, end = pointer(p.nodes[source]), pointer(p.nodes[slot])
     rounded = single(reference[0], reference[1], reference[2], reference[3])
-    world = p.check.world
+    world, limit = p.check.world, p.settings.crossing_speed
     flown, sway = propagate_watched(p.check.lane, start, end, p.check.goal, rounded, world.zone)
-    fast = world.vertical_mode > 0.0 and sway[0] * sway[0] + sway[1] * sway[1] > ZONE_SPEED * ZONE_SPEED
-    return BLOCKED if fast else _judged(p, flown, margin), flown, sway
+    fast = world.vertical_mode > 0.0 and sway[0] * sway[0] + sway[1] * sway[1] > limit * limit
+    return BLOCKED if fast else _judged(p, end, flown, margin), flown, sway
 
 
 @inlined

@@ -29,6 +29,7 @@ from planners.stop_check import (
     goes_on,
     margin_left,
     reference_of,
+    room_left,
     sensed,
 )
 
@@ -234,6 +235,7 @@ def planner_of(work, query, constants):
         view(constants.envelope, 0, Envelope),
         radius,
         min(margin, settings.rest_margin),
+        room_left(settings.room, vessel, world),
         lane.ticks * TICK,
         pointer(work.scratch),
     )

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.cl_rrt.tree import BACKUP, new_nodes
+from planners.disturbance import Sight
 
 
 class Report(NamedTuple):
@@ -35,6 +36,7 @@ class Memory:
     waiting: int = 0  # cycles since a path was last sent
     pending: NDArray[np.float64] | None = None  # with latency: the reference decided for the next period
     report: Report | None = None
+    sight: Sight | None = None  # what the estimator of the disturbance remembers; None in still weather
 
 
 def first_memory(capacity: int, reference: NDArray[np.float64]) -> Memory:

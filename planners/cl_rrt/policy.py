@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrone_gym._memory import packed
-from hydrone_gym.simulation.rollout import Rollout
-from hydrone_gym.simulation.simulation import row_at
 from planners.belief import Belief
+from planners.caution import caution_at
 from planners.cl_rrt.execute import Constants, Query, cycle
 from planners.cl_rrt.expand import ANY_MEDIUM, CAREFUL, DRAWS, EDGE_TIME, STRAIGHT_ON
 from planners.cl_rrt.memory import Memory, Report, first_memory
@@ -20,6 +19,7 @@ from planners.cl_rrt.settings import CLRRTSettings
 from planners.cl_rrt.stopping import safe_speed
 from planners.cl_rrt.tree import BACKUP, Workspace
 from planners.cl_rrt.view import TreeView, tree_view
+from planners.disturbance import Estimator, Sight
 from planners.policy import Known, Observation, PlannerPolicy, known, whole_number
 
 _CHUNK = 8  # samples between looks at the clock
@@ -40,13 +40,15 @@ class CLRRT(PlannerPolicy):
         time_budget: seconds a cycle may take instead (the paper's real-time loop; not reproducible).
         objective: what a path costs: "time" (s), "energy" (J), "length" (m), or "paper": the branch that ends closest
             to the goal, crossing where the line to a sample meets the transition zone.
+        level: of the weather to be ready for, 0 to 5. Above 0 it estimates the disturbance from what it observes,
+            predicts with that, and keeps farther from everything, see `planners.caution.caution_at`.
         latency: True to use in each period what was planned during the one before, from the predicted state, as a
             vehicle must whose planning takes a whole period; it flies slower, to stop within what it sensed then.
         seed: of the random stream; every episode starts it anew.
         settings: see `CLRRTSettings`.
 
     Raises:
-        ValueError: a budget that is not positive, an unknown objective.
+        ValueError: a budget that is not positive, an unknown objective, no level.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class CLRRT(PlannerPolicy):
         iterations: int = 100,
         time_budget: float | None = None,
         objective: str = "time",
+        level: int = 0,
         latency: bool = False,
         seed: int = 0,
         settings: CLRRTSettings | None = None,
@@ -68,39 +71,37 @@ class CLRRT(PlannerPolicy):
         if not isinstance(latency, bool):
             raise ValueError(f"latency must be True or False, got {latency!r}")
         self.belief = Belief.of(belief)
-        self.simulation = self.belief.simulation()
+        self.caution = caution_at(level)
+        self.estimator = Estimator(self.belief, weathered=level > 0)
+        self.simulation = self.estimator.simulation
         self.time_budget = time_budget
         self.latency = latency
-        self.settings = CLRRTSettings() if settings is None else settings
+        margins = CLRRTSettings(margin=self.caution.edge_margin, rest_margin=self.caution.rest_margin)
+        self.settings = margins if settings is None else settings
         envelope = self.belief.envelope
         costs = objective_params(envelope, objective)
-        self.cruise_speed = safe_speed(self.simulation, 2 if latency else 1)
+        self.cruise_speed = safe_speed(self.belief.simulation(), 2 if latency else 1)
         self._constants = Constants(packed(envelope), self._packed_settings(objective != "paper"), packed(costs))
 
     def _packed_settings(self, prune: bool) -> NDArray[np.float64]:
-        return packed(self.settings.params(self.cruise_speed * self.belief.period, prune=prune))
+        return packed(self.settings.params(self.cruise_speed * self.belief.period, self.caution, prune=prune))
 
     def act(self, now: Known, memory: Memory | None) -> tuple[NDArray[np.float64], Memory]:
         """Run one cycle of the execution loop (Alg. 2); return the reference (4,) and the new memory."""
         memory = first_memory(self.settings.max_nodes, now.reference) if memory is None else memory
+        memory = replace(memory, sight=self.estimator.look(now, memory.sight))
         if not self.latency:
             return self._decide(now, now.state[:3], memory)
         sending = now.reference if memory.pending is None else memory.pending
-        reference, memory = self._decide(self._ahead(now, sending), now.state[:3], memory)
+        # the end of this period under the reference sent now (Alg. 2, lines 4-8)
+        ahead = self.estimator.ahead(now, sending.astype(np.float32).astype(np.float64), memory.sight)
+        reference, memory = self._decide(ahead, now.state[:3], memory)
         return sending, replace(memory, pending=reference)
-
-    def _ahead(self, now: Known, sending: NDArray[np.float64]) -> Known:
-        """Predict the end of this period under the reference sent now (Alg. 2, lines 4-8)."""
-        row: Any = row_at(now.state, now.goal)
-        row["integral"], row["reference"] = now.integral, now.reference
-        sent = sending.astype(np.float32).astype(np.float64)
-        Rollout(self.simulation, np.zeros((0, 4))).fly(row, sent)
-        return now._replace(state=row["state"][0], integral=row["integral"][0], reference=sent)
 
     def _decide(self, start: Known, eye: NDArray[np.float64], memory: Memory) -> tuple[NDArray[np.float64], Memory]:
         """Plan from `start` with what was sensed from `eye`; return the reference for the period that begins there."""
         started = time.perf_counter()
-        work = Workspace.around(memory.nodes.copy(), memory.backup.copy(), self.simulation, start.obstacles)
+        work = self._workspace(memory.nodes.copy(), memory.backup.copy(), start, memory.sight)
         size, first, stop, end = self._run(work, start, eye, memory, started)
         if first < 0:
             return self._safety_action(memory, work, size, time.perf_counter() - started)
@@ -111,8 +112,15 @@ class CLRRT(PlannerPolicy):
         seconds = time.perf_counter() - started
         report = Report(size, int(work.edges[0]), depth, cost, bool(nodes["goal"][end]), seconds, 0)
         known_now = len(start.obstacles)
-        memory = Memory(nodes, work.backup, stop, size, first, known_now, memory.cycle + 1, 0, None, report)
+        cycle, sight = memory.cycle + 1, memory.sight
+        memory = Memory(nodes, work.backup, stop, size, first, known_now, cycle, 0, None, report, sight)
         return nodes["reference"][first].copy(), memory
+
+    def _workspace(
+        self, nodes: np.ndarray, backup: NDArray[np.float64], start: Known, sight: Sight | None
+    ) -> Workspace:
+        around = self.estimator.conditions(sight)
+        return Workspace.around(nodes, backup, self.simulation, start.obstacles, around)
 
     def _run(
         self, work: Workspace, start: Known, eye: NDArray[np.float64], memory: Memory, started: float
@@ -160,9 +168,9 @@ class CLRRT(PlannerPolicy):
             reference, backup, stop = work.backup[0], np.tile(work.backup[0], (BACKUP, 1)), 1
         waiting = memory.waiting + 1
         report = Report(size, int(work.edges[0]), 0, np.inf, False, seconds, waiting)
-        return reference.copy(), Memory(
-            memory.nodes, backup, stop, cycle=memory.cycle + 1, waiting=waiting, report=report
-        )
+        cycle, sight = memory.cycle + 1, memory.sight
+        memory = Memory(memory.nodes, backup, stop, cycle=cycle, waiting=waiting, report=report, sight=sight)
+        return reference.copy(), memory
 
     def grow_tree(self, observation: Observation, iterations: int) -> TreeView:
         """Grow a tree from one observation without flying, as in the paper's Fig. 5.
@@ -173,7 +181,7 @@ class CLRRT(PlannerPolicy):
         """
         start = known(observation)
         memory = first_memory(self.settings.max_nodes, start.reference)
-        work = Workspace.around(memory.nodes, memory.backup, self.simulation, start.obstacles)
+        work = self._workspace(memory.nodes, memory.backup, start, self.estimator.look(start, None))
         whole = copy.copy(self)
         whole.iterations, whole.time_budget = whole_number("iterations", iterations, 1), None
         # a picture of the tree wants its other branches too

@@ -20,7 +20,7 @@ _ALIGNED = 0.94  # cosine of the misalignment (20 degrees) below which the vehic
 @inlined
 def air_reference(p, vessel, aim, psi, step):
     """Step the reference linearly toward a point in air, at most `step` m on and `_LEAD` from the vehicle."""
-    w, s, old = p.check.world, state_of(vessel), view(vessel, REFERENCE, Pose)
+    s, old = state_of(vessel), view(vessel, REFERENCE, Pose)
     dx, dy, dz = aim.x - old.x, aim.y - old.y, aim.z - old.z
     across = np.sqrt(dx * dx + dy * dy)
     scale = min(1.0, step / max(across, 1e-9), _CLIMB * p.check.period / 0.5 / max(abs(dz), 1e-9))
@@ -30,14 +30,14 @@ def air_reference(p, vessel, aim, psi, step):
     most = _LEAD * p.check.envelope.cruise
     if lead > most:
         rx, ry, rz = s.x + lx * most / lead, s.y + ly * most / lead, s.z + lz * most / lead
-    rz = max(rz, AIR_GATE)
-    return inside(rx, w.x_min, w.x_max), inside(ry, w.y_min, w.y_max), inside(rz, w.z_min, w.z_max), psi
+    rx, ry, rz = inside(p.check, rx, ry, max(rz, AIR_GATE))
+    return rx, ry, rz, psi
 
 
 @inlined
 def water_reference(p, vessel, aim):
     """Place a carrot ahead of the vehicle toward a point in water: from the state, never from the old reference."""
-    w, s, speeds = p.check.world, state_of(vessel), p.objective.speeds
+    s, speeds = state_of(vessel), p.objective.speeds
     dx, dy = aim.x - s.x, aim.y - s.y
     distance = np.sqrt(dx * dx + dy * dy)
     sine, cosine = sincos(s.psi)
@@ -46,9 +46,5 @@ def water_reference(p, vessel, aim):
     scale = min(1.0, ahead / max(distance, 1e-9))
     climb = speeds.dive * _CLIMB_TIME
     rz = min(s.z + clamp(aim.z - s.z, -climb, climb), -WATER_GATE)
-    return (
-        inside(s.x + scale * dx, w.x_min, w.x_max),
-        inside(s.y + scale * dy, w.y_min, w.y_max),
-        inside(rz, w.z_min, w.z_max),
-        s.psi,
-    )
+    rx, ry, rz = inside(p.check, s.x + scale * dx, s.y + scale * dy, rz)
+    return rx, ry, rz, s.psi

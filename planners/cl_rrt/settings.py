@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from planners.stop_check import MARGIN
+from planners.caution import CALM, Caution
 
 _SWITCHES = ("re_propagate", "verify")
 
@@ -24,6 +24,10 @@ class SettingParams(NamedTuple):
     verify: float  # 1: an edge is sent only if it was seen to be followed by a stop
     step: float  # m an edge in air may move its reference: the safe speed times the period
     prune: float  # 1: samples that cannot beat the best path are dropped
+    room: float  # distance (m) to keep from the walls
+    crossing_speed: float  # limits of planned crossings: lateral, m/s
+    crossing_cos_tilt: float
+    apart: float  # m from its column that a vehicle may begin a water entry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +53,8 @@ class CLRRTSettings:
     goal_bias: float = 0.25
     column_bias: float = 0.35
     column_radius: float = 5.0
-    margin: float = 0.12
-    rest_margin: float = MARGIN
+    margin: float = CALM.edge_margin
+    rest_margin: float = CALM.rest_margin
     tries: int = 3
     extension: int = 12
     max_nodes: int = 2000
@@ -77,13 +81,15 @@ class CLRRTSettings:
             if not isinstance(value, int) or value < least:
                 raise ValueError(f"CLRRTSettings.{name} must be a whole number of at least {least}, got {value!r}")
 
-    def params(self, step: float, *, prune: bool = True) -> SettingParams:
+    def params(self, step: float, caution: Caution = CALM, *, prune: bool = True) -> SettingParams:
         """Flatten for the kernels.
 
         Args:
             step: how far an edge in air may move its reference, m.
+            caution: what else is kept from walls and at the surface.
             prune: whether samples that cannot beat the best path are dropped.
         """
-        values = (getattr(self, name) for name in SettingParams._fields[:-2])
+        values = (getattr(self, name) for name in SettingParams._fields[: SettingParams._fields.index("step")])
         plain = (float(value) if isinstance(value, bool) else value for value in values)
-        return SettingParams._make([*plain, step, float(prune)])
+        rules = caution.room, caution.crossing_speed, math.cos(caution.crossing_tilt), caution.apart
+        return SettingParams._make([*plain, step, float(prune), *rules])

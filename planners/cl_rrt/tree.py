@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hydrone_gym._jit import inlined
 from hydrone_gym._memory import fields_of, pointer
 from hydrone_gym.simulation.rollout import Rollout
-from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.simulation.simulation import STILL, Simulation
 from hydrone_gym.simulation.storage import VESSEL, Flown
 from planners.stop_check import Check, state_of
 
@@ -50,10 +50,15 @@ class Workspace(NamedTuple):
 
     @classmethod
     def around(
-        cls, nodes: np.ndarray, backup: NDArray[np.float64], simulation: Simulation, obstacles: NDArray[np.float64]
+        cls,
+        nodes: np.ndarray,
+        backup: NDArray[np.float64],
+        simulation: Simulation,
+        obstacles: NDArray[np.float64],
+        conditions: NDArray[np.float64] = STILL[0],
     ) -> Self:
         """Gather the arrays of one planning cycle around a tree and a backup, which it changes."""
-        path, rollout = np.zeros(len(nodes), np.int64), Rollout(simulation, obstacles)
+        path, rollout = np.zeros(len(nodes), np.int64), Rollout(simulation, obstacles, conditions)
         return cls(nodes, path, backup, rollout.memory, np.zeros(2 * VESSEL), np.zeros(1))
 
 

@@ -189,3 +189,57 @@ def test_bad_input():
         shield.check(observation, np.full((1, 4), np.nan), np.zeros((1, 4)))
     with pytest.raises(TypeError, match="HyDrone"):
         Shield.for_env(None, gym.make("CartPole-v1"))
+
+
+class Watching:
+    """Flies a straight line and keeps what it was shown."""
+
+    def __init__(self, env):
+        self.line, self.shown = StraightLine.for_env(env), []
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.shown.append({key: np.copy(value) for key, value in observation.items()})
+        return self.line.predict(observation)
+
+
+def test_with_latency_what_was_checked_in_a_period_is_flown_in_the_next():
+    """The policy sees what will be observed then, bit for bit, and the first period is flown as the episode begins."""
+    env = gym.make(IDS[1], num_obstacles=0)
+    watching = Watching(env)
+    shield = Shield.for_env(watching, env, latency=True)
+    (observation, _), state, sent = env.reset(seed=4), None, None
+    for period in range(30):
+        action, new = shield.predict(observation, state)
+        np.testing.assert_array_equal(action, observation["reference"] if period == 0 else sent)
+        (sent,), state = new.sent.astype(np.float32), new
+        observation = env.step(action)[0]
+        for key in ("state", "integral", "reference"):
+            np.testing.assert_array_equal(observation[key], watching.shown[-1][key])
+    assert np.linalg.norm(observation["state"][:3] - watching.shown[0]["state"][:3]) > 5.0
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_wild_policy_is_kept_safe_with_latency(env_id):
+    rows = gym.make_vec(env_id, num_envs=1, vectorization_mode="vector_entry_point")
+    shield = Shield.for_env(Wild(3, 6.0), rows, latency=True)
+    outcome, state, _ = first_outcomes(shield, env_id, 48, 900, time_limit=40.0)
+    assert not np.isin(outcome, BAD).any(), outcome
+    assert (state.interventions > 0).any()
+
+
+def test_with_latency_spheres_are_known_from_where_they_were_sensed():
+    """What is within the sensor's range of where the vehicle will be, but not of where it is, is not known free."""
+    env = gym.make(IDS[0], num_obstacles=0)
+    observation, _ = env.reset(seed=0)
+    observation["state"][:] = (0, 0, 5, 0, 0, 0, 1.0, 0, 0, 0, 0, 0)
+    observation["reference"][:] = (0, 0, 5, 0)
+    shield, held = Shield.for_env(None, env), observation["reference"][None]
+    proposed = np.array([[1.8, 0.0, 5.0, 0.0]])
+    assert shield.check(observation, proposed, held)[2].tolist() == [0]
+    assert shield.check(observation, proposed, held, eyes=np.array([[-1.5, 0.0, 5.0]]))[2].tolist() != [0]
+
+
+@pytest.mark.parametrize("latency", [1, None, "yes"])
+def test_bad_latency(latency):
+    with pytest.raises(ValueError, match=f"latency must be True or False, got {latency!r}"):
+        Shield.for_env(None, gym.make(IDS[0]), latency=latency)

@@ -1,15 +1,18 @@
 """The one stop check: its constants have their reasons, and CL-RRT and the shield ask the same one."""
 
+import itertools
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import hydrone_gym  # noqa: F401
-from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, Scenario
+from hydrone_gym import HYDRONE, HYDRONE_PHYSICAL, Outcome, Scenario, Spread, Weather
 from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.simulation import Simulation, row_at
 from hydrone_gym.world.world import World
 from planners import CLRRT, CLRRTSettings
+from planners.caution import caution_at
 from planners.cl_rrt.execute import Query, cycle
 from planners.cl_rrt.tree import BACKUP, Workspace, new_nodes
 from planners.policy import known
@@ -91,3 +94,94 @@ def test_what_cl_rrt_holds_under_water_is_verified_again():
     )
     assert cycle(work, query, planner._constants)[1] == -1
     np.testing.assert_array_equal(work.backup[0], retreat[0])
+
+
+STEADY = Weather(
+    wind=3.0,
+    wind_direction=0.0,
+    turbulence=0.0,
+    current=0.3,
+    current_direction=np.pi / 2.0,
+    current_variation=0.0,
+    spread=Spread(rotor_drag=(1.19e-4, 1.19e-4)),
+)
+
+
+def settled(z, periods):
+    """An environment in steady weather, a shield that is ready for it, what it observed last and what it remembers."""
+    env = gym.make("HydroneGym/Mission-v0", weather=STEADY)
+    scenario = Scenario(start=(0.0, 0.0, z, 0.0), goal=(8.0, 8.0, z), obstacles=())
+    observation, _ = env.reset(options={"scenario": scenario})
+    shield, state, hover = Shield.for_env(Hover(), env, level=3), None, None
+    for _ in range(periods):
+        hover, state = shield.predict(observation, state)
+        observation = env.step(hover)[0]
+    return env, shield, observation, shield.predict(observation, state)[1].sights
+
+
+class Hover:
+    """Asks for the reference in force."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return np.float32(observation["reference"]), None
+
+
+def test_in_wind_a_vehicle_that_leans_is_at_rest():
+    _, shield, observation, sights = settled(4.0, 16)
+    assert np.linalg.norm(observation["state"][3:5]) > 0.03  # more than what is level in still weather
+    here = observation["reference"][None]
+    assert shield.check(observation, here, here, sights=sights)[2].tolist() == [0]
+    # who believes in still air sees it rise against the wind, and comes to rest level
+    unaware = Shield.for_env(None, gym.make("HydroneGym/Mission-v0"))
+    row, rollout = row_at(observation["state"]), Rollout(unaware.simulation, np.zeros((0, 4)))
+    row["integral"], row["reference"] = observation["integral"], observation["reference"]
+    rollout.fly(row, observation["reference"])
+    assert np.abs(row["state"][0, :2] - observation["state"][:2]).max() > 0.04
+
+
+def test_in_a_current_a_drift_that_stays_clear_is_a_stop():
+    """Six seconds flown and two more carried on: 12, as in still water, would end at the farther sphere too."""
+    _, shield, observation, (sight,) = settled(-2.5, 1)
+    observation["state"][:], observation["integral"][:] = (0, 0, -2.5, 0, 0, 0, 0, 0.15, 0, 0, 0, 0), 0.0
+    observation["reference"][:] = (0, 0, -2.5, 0)
+    here, passed = observation["reference"][None], []
+    adrift = (sight._replace(estimate=np.array([0.0, 0.0, 0.0, 0.0, 0.15, 0.0])),)
+    for distance in (2.55, 3.0):
+        observation["obstacles"] = np.array([[0.0, distance, -2.5, 0.8]])
+        passed.append(shield.check(observation, here, here, sights=adrift)[2][0] == 0)
+    assert passed == [False, True]
+
+
+def test_in_weather_more_is_kept_from_walls_and_spheres():
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=0)
+    observation, _ = env.reset(seed=0)
+    observation["state"][:6], observation["reference"][:] = (9.6, 0, 5, 0, 0, 0), (9.6, 0, 5, 0)
+    here, ends = observation["reference"][None], {0: [], 3: []}
+    for level, x in itertools.product(ends, np.linspace(9.6, 10.0, 21)):
+        sent, held, _ = Shield.for_env(None, env, level=level).check(observation, np.array([[x, 0, 5, 0]]), here)
+        row, rollout = row_at(observation["state"]), Rollout(Simulation(HYDRONE, World()), np.zeros((0, 4)))
+        for reference in [sent[0], *[held[0]] * 12]:
+            rollout.fly(row, reference)
+            ends[level].append(row["state"][0, 0])
+    assert max(ends[3]) <= 9.85 < 9.88 < max(ends[0]) < 10.0
+    assert caution_at(3)._asdict() == pytest.approx(
+        {
+            "margin": 0.15,
+            "edge_margin": 0.25,
+            "rest_margin": 0.12,
+            "room": 0.15,
+            "crossing_speed": 0.15,
+            "crossing_tilt": np.radians(4.5),
+            "apart": 0.5,
+        }
+    )
+
+
+def test_a_vehicle_that_weather_has_put_near_a_wall_may_leave():
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=0)
+    observation, _ = env.reset(seed=0)
+    observation["state"][:6], observation["reference"][:] = (9.95, 0, 5, 0, 0, 0), (9.95, 0, 5, 0)
+    here = observation["reference"][None]
+    for level in (0, 3):
+        shield = Shield.for_env(None, env, level=level)
+        assert shield.check(observation, np.array([[9.9, 0.0, 5.0, 0.0]]), here)[2].tolist() == [0]

@@ -1,0 +1,40 @@
+"""How much planner and shield keep away from what they know, by the level of the weather they are to be ready for."""
+
+import math
+from typing import Any, NamedTuple
+
+from planners.stop_check import MARGIN
+
+LEVELS = 5
+_TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
+
+
+class Caution(NamedTuple):
+    """What a planner keeps away from: in still weather, or more in weather, where it is not where it believes to be."""
+
+    margin: float  # clearance (m) that the shield keeps
+    edge_margin: float  # the CL-RRT along its edges
+    rest_margin: float  # and at their stops
+    room: float  # from the walls, m; references 0.1 m more
+    crossing_speed: float  # lateral limit of crossings that are planned, m/s; rough is 0.2
+    crossing_tilt: float  # rad; rough is 5 degrees
+    apart: float  # m from its column that a vehicle may begin a water entry
+
+
+def caution_at(level: Any) -> Caution:
+    """Return what to keep at a level of weather, 0 for none; raises ValueError for what is no level.
+
+    A vehicle that leans against wind, or drifts in a current, cannot cross as smoothly as one in still weather.
+    """
+    if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= LEVELS:
+        raise ValueError(f"level must be a whole number from 0 to {LEVELS}, got {level!r}")
+    if level == 0:
+        # what is left between vehicle and column would pull it sideways inside the zone
+        return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.12)
+    share = level / _TUNED
+    margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
+    # wind holds the vehicle beside its reference, and inside the zone it brakes and is not pulled
+    return Caution(*margins, 0.15, math.radians(4.5), 0.5)
+
+
+CALM = caution_at(0)
