@@ -153,7 +153,7 @@ def _take_off(lane, start, goal, reference):
 
 
 @inlined
-def _fly(lane, first, last):
+def _advance(lane, first, last):
     """Fly the vehicle that took off through ticks [first, last) of a period."""
     around = (lane.obstacles, lane.closest, lane.weather, lane.values, lane.number)
     call(lane.address, lane.block, *around, first, last, lane.ticks)
@@ -185,7 +185,7 @@ def propagate(lane, start, end, goal, reference):
         reference: (x, y, z, psi), m and rad.
     """
     _take_off(lane, start, goal, reference)
-    _fly(lane, 0, lane.ticks)
+    _advance(lane, 0, lane.ticks)
     return _land(lane, end, reference)
 
 
@@ -199,7 +199,7 @@ def propagate_watched(lane, start, end, goal, reference, zone):
     _take_off(lane, start, goal, reference)
     vx, vy = 0.0, 0.0
     for tick in range(lane.ticks):
-        _fly(lane, tick, tick + 1)
+        _advance(lane, tick, tick + 1)
         s = view(lane.block, 0, State)
         sx, sy = s.vx, s.vy
         if lane.weathered > 0:

@@ -211,7 +211,7 @@ def _settle(p, source, size, brake, onward, limit):
 @routine
 def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
-    w, s = p.check.world, node_state(p, source)
+    s = node_state(p, source)
     column = column_from(p, s, sample)
     if not column_is_free(p, column[0], column[1]):
         return size
