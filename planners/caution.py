@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 from planners.stop_check import MARGIN
 
 LEVELS = 5
+_CURRENT = 0.1  # m/s a level
+_TURN = 7.0  # s to leave the zone and turn against a current
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
 
 
@@ -19,6 +21,7 @@ class Caution(NamedTuple):
     crossing_speed: float  # lateral limit of crossings that are planned, m/s; rough is 0.2
     crossing_tilt: float  # rad; rough is 5 degrees
     apart: float  # m from its column that a vehicle may begin a water entry
+    drift: float  # m from the walls that a water entry keeps: what an unknown current carries a vehicle until it swims
 
 
 def caution_at(level: Any) -> Caution:
@@ -30,11 +33,11 @@ def caution_at(level: Any) -> Caution:
         raise ValueError(f"level must be a whole number from 0 to {LEVELS}, got {level!r}")
     if level == 0:
         # what is left between vehicle and column would pull it sideways inside the zone
-        return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.12)
+        return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.12, 0.0)
     share = level / _TUNED
     margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
     # wind holds the vehicle beside its reference, and inside the zone it brakes and is not pulled
-    return Caution(*margins, 0.15, math.radians(4.5), 0.5)
+    return Caution(*margins, 0.15, math.radians(4.5), 0.5, _CURRENT * level * _TURN)
 
 
 CALM = caution_at(0)

@@ -22,6 +22,7 @@ from planners.stop_check import AIR_GATE, WATER_GATE, inside
 
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate
+_ROUNDING = 0.5  # m: a vehicle stops not quite where the column was drawn
 _CLEAR_OF_ZONE = 0.02  # m
 _BRAKE = 0.75  # s of braking after which another way to brake is tried
 _BRAKE_LEAD = 0.3  # s: where a reference that brakes leads the vehicle
@@ -54,6 +55,13 @@ def facing(x, y, to_x, to_y, psi):
 def column_is_free(p, x, y):
     """Whether a vertical path through the zone clears every known obstacle."""
     return clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), p.check.lane, 0, p.check.radius) >= p.margin
+
+
+@inlined
+def near_wall(p, x, y):
+    """Whether a current that nobody knows could carry a vehicle from a column into a wall before it swims."""
+    w, away = p.check.world, p.settings.drift - _ROUNDING
+    return x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away
 
 
 @inlined
@@ -213,7 +221,7 @@ def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     s = node_state(p, source)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1]):
+    if not column_is_free(p, column[0], column[1]) or (is_air(s.z) and near_wall(p, column[0], column[1])):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)

@@ -15,6 +15,7 @@ from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
+from hydrone_gym.surface import is_air
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
@@ -181,6 +182,8 @@ def verify_stop(p, first):
     copy_vessel(vessel, end)
     node, count = first, 0
     safe, hover = can_hover(p.check, end)
+    # in weather who is out of the water does not go back: there the vehicle is carried along
+    safe = safe and not (p.check.room > 0.0 and p.nodes[first].kind == CROSSING and is_air(p.check.goal.z))
     while not safe and p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
         if node < 0:  # what comes after it was pruned

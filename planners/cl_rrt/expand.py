@@ -100,8 +100,9 @@ def draw_column(p, draws, k, roam):
     else:
         sine, cosine = sincos(angle)
         radius = p.settings.column_radius * (share - _MEETING_SHARE) / (1.0 - _MEETING_SHARE)
-    x = min(max(cx + radius * cosine, w.x_min + _WALL), w.x_max - _WALL)
-    y = min(max(cy + radius * sine, w.y_min + _WALL), w.y_max - _WALL)
+    wall = max(_WALL, p.settings.drift) if from_air else _WALL
+    x = min(max(cx + radius * cosine, w.x_min + wall), w.x_max - wall)
+    y = min(max(cy + radius * sine, w.y_min + wall), w.y_max - wall)
     return x, y, -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT
 
 

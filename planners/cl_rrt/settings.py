@@ -28,6 +28,7 @@ class SettingParams(NamedTuple):
     crossing_speed: float  # limits of planned crossings: lateral, m/s
     crossing_cos_tilt: float
     apart: float  # m from its column that a vehicle may begin a water entry
+    drift: float  # m from the walls that a water entry keeps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,5 +92,5 @@ class CLRRTSettings:
         """
         values = (getattr(self, name) for name in SettingParams._fields[: SettingParams._fields.index("step")])
         plain = (float(value) if isinstance(value, bool) else value for value in values)
-        rules = caution.room, caution.crossing_speed, math.cos(caution.crossing_tilt), caution.apart
+        rules = caution.room, caution.crossing_speed, math.cos(caution.crossing_tilt), caution.apart, caution.drift
         return SettingParams._make([*plain, step, float(prune), *rules])
