@@ -1,4 +1,4 @@
-"""How well each law holds its place, one disturbance at a time, and how closely it follows a circle: Markdown tables.
+"""What each law promises, how it holds its place in one disturbance at a time, and how it follows a circle: tables.
 
     python -m benchmarks.holding
     python -m benchmarks.holding --controllers robust
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.control.laws import LAWS
+from hydrone_gym.control.laws import LAWS, envelope_of
 from hydrone_gym.simulation.conditions import CONDITIONS, begin_conditions, climate_of
 from hydrone_gym.simulation.simulation import LANES, Simulation
 from hydrone_gym.simulation.storage import new_rows
@@ -28,6 +28,8 @@ WORLD = World(lower=(-500.0, -500.0, -5.0), upper=(500.0, 500.0, 50.0), rough_tr
 AIR, WATER = 5.0, -3.0  # m
 SECONDS, LATE = 30.0, 10.0  # s of a flight, and those that are its end
 STILL = Weather()
+UNITS = {"cruise": "m/s", "climb": "m/s", "surge": "m/s", "dive": "m/s", "zone": "m/s", "stop_time": "s"}
+UNITS |= {"hold_radius": "m", "flight_power": "W", "swim_power": "W"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +149,15 @@ def _cells(laws: Sequence[str], factor: Factor) -> list[str]:
     return cells
 
 
+def envelopes(laws: Sequence[str]) -> str:
+    """Markdown table of what each law publishes of its limits."""
+    found = [envelope_of(HYDRONE, law) for law in laws]
+    lines = [f"| `Envelope` | {' | '.join(laws)} |", f"|---|{'---:|' * len(laws)}"]
+    for name, unit in UNITS.items():
+        lines.append(f"| {name}, {unit} | {' | '.join(f'{getattr(envelope, name):.3g}' for envelope in found)} |")
+    return "\n".join(lines)
+
+
 def table(laws: Sequence[str]) -> str:
     """Markdown tables of all factors, and of the circles."""
     heads = [f"{law}: {where}" for law in laws for where in ("air across", "height", "water across", "depth")]
@@ -167,7 +178,8 @@ def table(laws: Sequence[str]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--controllers", nargs="+", choices=tuple(LAWS), default=list(LAWS), help="control laws")
-    print(table(parser.parse_args().controllers))
+    laws = parser.parse_args().controllers
+    print(envelopes(laws), table(laws), sep="\n\n")
 
 
 if __name__ == "__main__":

@@ -171,7 +171,7 @@ def _panel(axis: Any, flyers: Sequence[Flyer], steps: tuple[Step, ...], title: s
             label = None if k else step.name.split(", ", 1)[1]
             axis.plot(r.times, r.share, _DASHES[k], color=colour, lw=1.4, label=label)
     axis.set(
-        title=title, xlim=(0, until), ylim=(-0.05, 1.25), xlabel="time (s)", ylabel="share of the step covered (1)"
+        title=title, xlim=(0, until), ylim=(-0.05, 1.45), xlabel="time (s)", ylabel="share of the step covered (1)"
     )
     axis.legend(fontsize=8, loc="lower right")
 
