@@ -89,18 +89,27 @@ def single(driving: str, name: str, interface: str = "world") -> tuple[Contestan
     return Contestant(name, run), flights
 
 
-def make_vector(count: int, interface: str = "world", threads: int | None = None, weather: int = 0) -> Any:
-    """A native vector env; `threads` and `weather` only where they are asked for."""
+def make_vector(
+    count: int, interface: str = "world", threads: int | None = None, weather: int = 0, controller: str = "paper"
+) -> Any:
+    """A native vector env; `threads`, `weather` and `controller` only where they are asked for."""
     options: dict[str, Any] = {} if threads is None else {"threads": threads}
     options |= {"weather": weather} if weather else {}
+    options |= {"controller": controller} if controller != "paper" else {}
     return gym.make_vec(ID, num_envs=count, vectorization_mode="vector_entry_point", interface=interface, **options)
 
 
 def vector(
-    count: int, driving: str, name: str, interface: str = "world", threads: int | None = None, weather: int = 0
+    count: int,
+    driving: str,
+    name: str,
+    interface: str = "world",
+    threads: int | None = None,
+    weather: int = 0,
+    controller: str = "paper",
 ) -> tuple[Contestant, Flights]:
     """A native vector env in its default autoreset mode."""
-    env = make_vector(count, interface, threads, weather)
+    env = make_vector(count, interface, threads, weather, controller)
     space: Any = env.single_action_space
     rng = np.random.default_rng(0)
     drawn = rng.uniform(space.low, space.high, (DRAWN, count, *space.shape)).astype(np.float32)

@@ -23,7 +23,7 @@ import tyro
 from numpy.typing import NDArray
 
 import hydrone_gym
-from benchmarks.golden_flights import FIRST, IDS, PILOTS, Flown, fly_single, fly_vector
+from benchmarks.golden_flights import FIRST, IDS, OPTIONS, PILOTS, Flown, fly_single, fly_vector
 from benchmarks.timing import machine
 from hydrone_gym import Outcome
 
@@ -144,7 +144,7 @@ def differing(flown: Mapping[int, Flown], golden: Golden) -> list[str]:
 def fly(name: str, way: str, flights: int) -> tuple[dict[int, Flown], float]:
     """Fly a policy's worlds; return flights and CPU seconds."""
     began = time.process_time()
-    return WAYS[way](PILOTS[name], range(flights)), time.process_time() - began
+    return WAYS[way](PILOTS[name], range(flights), OPTIONS.get(name, {})), time.process_time() - began
 
 
 def report(name: str, way: str, flights: int, golden: Golden) -> bool:

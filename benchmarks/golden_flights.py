@@ -100,7 +100,9 @@ PILOTS: dict[str, MakePilot] = {
     "ppo": lambda env: PolicyPilot(load_agent("ppo", env)),
     "clrrt-published": lambda env: PolicyPilot(planners.PublishedCLRRT.for_env(env)),
     "mppi": lambda env: PolicyPilot(planners.MPPI.for_env(env)),
+    "random-robust": lambda env: Wanderer(getattr(env, "single_action_space", env.action_space)),
 }
+OPTIONS = {"random-robust": {"controller": "robust"}}  # of the environments of a pilot, where they are not the defaults
 
 
 class Log:
@@ -141,11 +143,11 @@ def by_id(worlds: Iterable[int]) -> dict[str, list[int]]:
     return found
 
 
-def fly_single(make: MakePilot, worlds: Iterable[int]) -> dict[int, Flown]:
+def fly_single(make: MakePilot, worlds: Iterable[int], options: Mapping[str, Any]) -> dict[int, Flown]:
     """Fly worlds one after the other in single environments."""
     flown = {}
     for name, queue in by_id(worlds).items():
-        env = gym.make(name, disable_env_checker=True)
+        env = gym.make(name, disable_env_checker=True, **options)
         pilot = make(env)
         for world in queue:
             flown[world] = _fly_one(env, pilot, world)
@@ -164,21 +166,21 @@ def _fly_one(env: gym.Env, pilot: Pilot, world: int) -> Flown:
     return log.end(info)
 
 
-def fly_vector(make: MakePilot, worlds: Iterable[int], rows: int = ROWS) -> dict[int, Flown]:
+def fly_vector(make: MakePilot, worlds: Iterable[int], options: Mapping[str, Any]) -> dict[int, Flown]:
     """Fly worlds side by side in vector environments; a row that ends begins the next world."""
     flown = {}
     for name, queue in by_id(worlds).items():
-        flown |= _Rows(name, make, queue, rows).fly()
+        flown |= _Rows(name, make, queue, options).fly()
     return flown
 
 
 class _Rows:
     """A vector environment and its queue of worlds; rows without a world left fly their last one again, unnoted."""
 
-    def __init__(self, name: str, make: MakePilot, queue: Sequence[int], rows: int) -> None:
-        count = min(rows, len(queue), max(2, len(queue) // 2))
+    def __init__(self, name: str, make: MakePilot, queue: Sequence[int], options: Mapping[str, Any]) -> None:
+        count = min(ROWS, len(queue), max(2, len(queue) // 2))
         self.env = gym.make_vec(
-            name, num_envs=count, vectorization_mode="vector_entry_point", autoreset_mode="Disabled"
+            name, num_envs=count, vectorization_mode="vector_entry_point", autoreset_mode="Disabled", **options
         )
         self.pilot = make(self.env)
         self.worlds, self.waiting = list(queue[:count]), list(queue[count:])

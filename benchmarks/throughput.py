@@ -66,6 +66,8 @@ def environments(settings: Settings) -> dict[str, Any]:
             add(vector(count, "uniform", f"vector {count}, uniform"))
         for level in (1, 5):
             add(vector(1024, "near", f"vector 1024, near, weather {level}", weather=level))
+        for driving in ("near", "uniform"):
+            add(vector(1024, driving, f"vector 1024, {driving}, robust law", controller="robust"))
         if has_egocentric():
             for count in SIZES[1:]:
                 add(vector(count, "uniform", f"egocentric {count}", interface="egocentric"))

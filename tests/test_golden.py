@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.golden import arithmetic, differing, load
-from benchmarks.golden_flights import PILOTS, Replay, fly_single, fly_vector
+from benchmarks.golden_flights import OPTIONS, PILOTS, Replay, fly_single, fly_vector
 
 RECORDED, ABOUT = load()
 WAYS = {"single": fly_single, "vector": fly_vector}
@@ -42,7 +42,7 @@ class Compared:
 @pytest.mark.parametrize("name", PILOTS)
 def test_recorded_actions_lead_to_the_recorded_flights(name, way):
     sent = RECORDED[name].sent()
-    flown = WAYS[way](lambda env: Replay(sent), sent)
+    flown = WAYS[way](lambda env: Replay(sent), sent, OPTIONS.get(name, {}))
     assert len(flown) == len(sent) > 2
     assert not differing(flown, RECORDED[name])
 
@@ -56,11 +56,11 @@ def test_policies_fly_as_recorded(name, way):
         compared.append(Compared(PILOTS[name](env), sent))
         return compared[-1]
 
-    WAYS[way](make, sent)
+    WAYS[way](make, sent, OPTIONS.get(name, {}))
     assert sum(pilot.asked for pilot in compared) >= len(sent) * DECISIONS
     assert max(pilot.furthest for pilot in compared) <= CLOSE
     if name not in ROUNDED or ABOUT[name]["arithmetic"] == arithmetic():
-        assert not differing(WAYS[way](PILOTS[name], range(FLIGHTS[name])), RECORDED[name])
+        assert not differing(WAYS[way](PILOTS[name], range(FLIGHTS[name]), OPTIONS.get(name, {})), RECORDED[name])
 
 
 def test_a_thousand_flights_of_every_policy_are_recorded():

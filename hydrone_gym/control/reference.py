@@ -20,7 +20,10 @@ class Reference(NamedTuple):
 
 
 class Integral(NamedTuple):
-    """Controller memory: integral contributions in output units (rpm in air, N in water), zero at a crossing."""
+    """Controller memory, zero at a crossing: integral contributions in output units (rpm in air, N in water).
+
+    The robust law keeps the velocity (m/s) and the yaw rate (rad/s) that it predicts here.
+    """
 
     z: float
     phi: float

@@ -178,6 +178,26 @@ def mix_air(lift, roll, pitch, yaw, vehicle, medium):
 
 
 @inlined
+def mix_water(lift, pitch, push, yaw, vehicle, medium):
+    """Return four rotor speeds (rpm) for forces up and ahead (N) and moments (N m): 1 and 3 level, 2 and 4 heading first.
+
+    Pitch never takes more than 0.3 of a rotor's thrust: the vehicle rights itself.
+    """
+    most = medium.thrust * medium.rotor_max * medium.rotor_max
+    half = 0.5 / vehicle.arm
+    n, m = clamp(half * yaw, -most, most), clamp(half * pitch, -0.3 * most, 0.3 * most)
+    room = most - abs(n)
+    each, deep = clamp(0.5 * push, -room, room), clamp(0.5 * lift, abs(m) - most, most - abs(m))
+    scale = 1.0 / medium.thrust
+    return (
+        _speed(deep - m, scale, medium),
+        _speed(each + n, scale, medium),
+        _speed(deep + m, scale, medium),
+        _speed(each - n, scale, medium),
+    )
+
+
+@inlined
 def _speed(force, scale, medium):
     """Rotor speed (rpm) of a thrust (N), within the rotor's limits."""
     return clamp(signed_root(force * scale), medium.rotor_min, medium.rotor_max)
@@ -231,12 +251,12 @@ def flow_along(velocity, disturbance, drag):
 
 
 @inlined
-def course(now, disturbance, gains):
+def course(now, disturbance, gains, limit):
     """Return where to swim: (wanted and present speed through the water along the bow, m/s; error of heading, rad).
 
     The bow or the stern points along the velocity through the water, the wanted one over ground less the current, and
-    within the hold radius against the current alone. A vehicle that is not worth turning, and one inside the zone in
-    vertical mode, drifts with the water.
+    within the hold radius against the current alone, at most at the speed `limit` (m/s). A vehicle that is not worth
+    turning, and one inside the zone in vertical mode, drifts with the water.
     """
     state, attitude, reference = now.state, now.attitude, now.reference
     ahead = state.vx * attitude.c_psi + state.vy * attitude.s_psi
@@ -253,7 +273,7 @@ def course(now, disturbance, gains):
     drive = wx * wx + wy * wy > _STILL * _STILL and not now.vertical
     error = arctan(wy / wx) if wx != 0.0 else 0.5 * np.pi
     on_course = max(1.0 - error * error / (_ASTRAY * _ASTRAY), 0.0)
-    size = min(np.sqrt(wx * wx + wy * wy), gains.surge_limit) * on_course
+    size = min(np.sqrt(wx * wx + wy * wy), limit) * on_course
     wanted = -size if wx < 0.0 else size
     return wanted if drive else 0.0, ahead - flow_x, error if drive else 0.0
 
@@ -271,24 +291,15 @@ def water_control(now, disturbance, model):
     upwards = gains.depth_d * (climb - state.vz) - disturbance.z + medium.drag_z * abs(climb) * climb
     lift = (upwards / medium.inverse_mass + medium.weight) / (attitude.c_phi * attitude.c_theta)
     level = -(gains.level_p * state.theta + gains.level_d * now.rates[1]) / medium.inverse_inertia_y
-    wanted, surge, off = course(now, disturbance, gains)
+    surfacing = gains.crossing_share * model.world.rough_speed + gains.zone_braking * seconds
+    limit = min(gains.surge_limit, surfacing) if now.reference.z > 0.0 else gains.surge_limit
+    wanted, surge, off = course(now, disturbance, gains, limit)
     push = (gains.surge_d * (wanted - surge) + medium.drag_x * abs(wanted) * wanted) / medium.inverse_mass
     fastest = gains.turn_limit
     rate = clamp(gains.heading_p * off, -fastest, fastest)
     turning = gains.heading_d * (rate - state.r) - disturbance.yaw + medium.rotational_drag_z * abs(rate) * rate
     yaw = turning / medium.inverse_inertia_z
-    most = medium.thrust * medium.rotor_max * medium.rotor_max
-    half = 0.5 / model.vehicle.arm
-    n, m = clamp(half * yaw, -most, most), clamp(half * level, -0.3 * most, 0.3 * most)
-    room = most - abs(n)
-    each, deep = clamp(0.5 * push, -room, room), clamp(0.5 * lift, abs(m) - most, most - abs(m))
-    scale = 1.0 / medium.thrust
-    return (
-        _speed(deep - m, scale, medium),
-        _speed(each + n, scale, medium),
-        _speed(deep + m, scale, medium),
-        _speed(each - n, scale, medium),
-    )
+    return mix_water(lift, level, push, yaw, model.vehicle, medium)
 
 
 @inlined

@@ -53,9 +53,10 @@ class HydroneEnv(gym.Env[Any, Any]):
     ## Description
     The HyDrone lives in a box of 20 x 20 x 15 m, air above z = 0 and water below. It starts at rest and has to reach
     the goal within 0.5 m, without touching a sphere and without crossing the surface roughly. A step is one period: the
-    reference moves on a straight line from where it was to the action, and the paper's control laws follow it at
-    100 Hz. Inside the transition zone, abs(z) <= 0.8 m, `vertical_mode` holds the vehicle still laterally, and in air
-    it does not descend before it is nearly at rest. World frame: x, y horizontal, z up; SI units.
+    reference moves on a straight line from where it was to the action, and a control law, the paper's unless
+    `controller` names another, follows it at 100 Hz. Inside the transition zone, abs(z) <= 0.8 m, `vertical_mode` holds
+    the vehicle still laterally, and in air it does not descend before it is nearly at rest; `crossing` has other rules.
+    World frame: x, y horizontal, z up; SI units.
 
     | id | start | goal |
     |---|---|---|
@@ -74,11 +75,13 @@ class HydroneEnv(gym.Env[Any, Any]):
     | key | shape | content |
     |---|---|---|
     | `state` | (12,) | position (m), Euler angles phi, theta, psi (rad, ZXY), velocity (m/s), body rates (rad/s) |
-    | `integral` | (4,) | the controller's memory: altitude, roll, pitch, yaw (rpm in air, N in water) |
+    | `integral` | (4,) | the controller's memory, zeros at the start and after a crossing |
     | `reference` | (4,) | the reference now in force (m, m, m, rad) |
     | `goal` | (3,) | m |
     | `obstacles` | (num_obstacles, 4) | `[x, y, z, r]` (m) of the spheres detected so far, in order; zero rows after |
 
+    The memory of the paper's law is its integrals: altitude, roll, pitch, yaw (rpm in air, N in water); that of the
+    robust law the velocity (m/s, world) and the yaw rate (rad/s) that it predicted for now.
     A sphere is detected once its surface has been within `sensor_range` of the vehicle's centre.
 
     ## Rewards

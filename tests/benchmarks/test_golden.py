@@ -104,6 +104,6 @@ def test_another_last_action_is_another_flight(file, fly):
     assert len(sent) == KEPT
     sent[2] = sent[2].copy()
     sent[2][-1, 0] = np.nextafter(sent[2][-1, 0], np.float32(0.0))
-    flown = fly(lambda env: Replay(sent), sent)
+    flown = fly(lambda env: Replay(sent), sent, {})
     differ = [world for world in sent if flown[world].fingerprint != golden.fingerprints[world]]
     assert differ == [2]

@@ -47,7 +47,16 @@ def test_crosses_among_dense_large_spheres():
     assert outcomes == [Outcome.GOAL] * 12
 
 
-@pytest.mark.parametrize("options", [{}, {"vehicle": "hydrone-agile"}, {"period": 0.2}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"vehicle": "hydrone-agile"},
+        {"period": 0.2},
+        {"controller": "robust"},
+        {"controller": "robust", "crossing": "adaptive"},
+    ],
+)
 @pytest.mark.parametrize("mission", MISSIONS)
 def test_prediction_is_execution(mission, options):
     """Every node sent is reached bit for bit, the node's references played in the environment."""

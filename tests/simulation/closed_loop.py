@@ -5,6 +5,7 @@ held for 10 ms as the real controller holds them, and an event at the surface wh
 `fly_stepped` replays the simulation's own arithmetic one step at a time and hands out the rotor speeds.
 """
 
+import functools
 from types import FunctionType
 
 import numba
@@ -16,10 +17,10 @@ from scipy.optimize import brentq
 from hydrone_gym._jit import kernel
 from hydrone_gym.control.law import control
 from hydrone_gym.control.laws import named_law
-from hydrone_gym.control.paper import PaperGains
 from hydrone_gym.control.reference import FLAT, Instant, Integral, Reference
 from hydrone_gym.physics.dynamics import medium_at, step
 from hydrone_gym.physics.kinematics import State, attitude_of, euler_rates
+from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.simulation.storage import model_of, pack_model
 from tests.physics import oracle
 
@@ -45,27 +46,32 @@ def _compile_oracle():
 exact_derivative = _compile_oracle()
 
 
-@kernel
-def _control(values, state, integral, reference, vertical, air, dt, speeds):
-    model = model_of(values, PaperGains)
-    s = State(*to_fixed_tuple(state, 12))
-    memory = Integral(*to_fixed_tuple(integral, 4))
-    wanted = Reference(*to_fixed_tuple(reference, 7))
-    medium = medium_at(model.vehicle, air)
-    attitude = attitude_of(s)
-    rates = euler_rates(attitude, s.p, s.q, s.r)
-    now = Instant(s, attitude, rates, wanted, vertical, air, medium, FLAT)
-    out, new = control(now, memory, model, dt)
-    for i in range(4):
-        speeds[i] = out[i]
-        integral[i] = new[i]
+@functools.cache
+def controller(law):
+    """Return the kernel that runs a law for one instant, and moves its memory."""
+    gains = named_law(law).gains
+
+    def one_instant(values, state, integral, reference, vertical, air, dt, speeds):
+        model = model_of(values, gains)
+        s = State(*to_fixed_tuple(state, 12))
+        memory = Integral(*to_fixed_tuple(integral, 4))
+        wanted = Reference(*to_fixed_tuple(reference, 7))
+        medium = medium_at(model.vehicle, air)
+        attitude = attitude_of(s)
+        rates = euler_rates(attitude, s.p, s.q, s.r)
+        now = Instant(s, attitude, rates, wanted, vertical, air, medium, FLAT)
+        out, new = control(now, memory, model, dt)
+        for i in range(4):
+            speeds[i] = out[i]
+            integral[i] = new[i]
+
+    return kernel(one_instant)
 
 
 @kernel
-def _step(values, state, speeds, air, dt):
-    model = model_of(values, PaperGains)
+def step_once(vehicle, state, speeds, air, dt):
     s = State(*to_fixed_tuple(state, 12))
-    new = step(s, attitude_of(s), to_fixed_tuple(speeds, 4), model.vehicle, medium_at(model.vehicle, air), air, dt)
+    new = step(s, attitude_of(s), to_fixed_tuple(speeds, 4), vehicle, medium_at(vehicle, air), air, dt)
     for i, value in enumerate(new):
         state[i] = value
 
@@ -77,9 +83,10 @@ def wrapped(angle):
 class ClosedLoop:
     """A vehicle under its control law, 10 ms at a time, with the reference ramp of the simulation."""
 
-    def __init__(self, vehicle, world, period, start, reference):
+    def __init__(self, vehicle, world, period, start, reference, law="paper"):
         self.vehicle, self.world, self.period = vehicle, world, period
-        self.values = pack_model(vehicle, world, named_law("paper"))
+        self.params = vehicle_params(vehicle)
+        self.values, self.controller = pack_model(vehicle, world, named_law(law)), controller(law)
         self.media = (oracle.medium(vehicle, water=False), oracle.medium(vehicle, water=True))
         self.state = np.array(start, dtype=np.float64)
         self.reference = np.array(reference, dtype=np.float64)
@@ -91,7 +98,7 @@ class ClosedLoop:
         height = self.state[2]
         vertical = bool(abs(height) <= self.world.zone and self.world.vertical_mode)
         out = np.empty(4)
-        _control(self.values, self.state, self.integral, moving, vertical, bool(height > 0.0), dt, out)
+        self.controller(self.values, self.state, self.integral, moving, vertical, bool(height > 0.0), dt, out)
         return out
 
     def play(self, references, advance):
@@ -111,7 +118,7 @@ class ClosedLoop:
         """One step of the project's own integrator."""
         air = bool(self.state[2] > 0.0)
         self.rotor_speeds = self.speeds(moving)
-        _step(self.values, self.state, self.rotor_speeds, air, DT)
+        step_once(self.params, self.state, self.rotor_speeds, air, DT)
         if air != (self.state[2] > 0.0):
             self.integral[:] = 0.0
 

@@ -5,7 +5,7 @@ from scipy.integrate import odeint
 from scipy.optimize import brentq
 
 from tests.physics import oracle_outdoors as outdoors
-from tests.simulation.closed_loop import DT, ClosedLoop, _control, wrapped
+from tests.simulation.closed_loop import DT, ClosedLoop, wrapped
 
 
 class OutdoorLoop(ClosedLoop):
@@ -25,7 +25,7 @@ class OutdoorLoop(ClosedLoop):
     def speeds(self, moving, dt=DT):
         vertical = bool(abs(self.state[2]) <= self.world.zone and self.world.vertical_mode)
         out = np.empty(4)
-        _control(self.values, self.state, self.integral, moving, vertical, bool(self.air), dt, out)
+        self.controller(self.values, self.state, self.integral, moving, vertical, bool(self.air), dt, out)
         return out
 
     def advance_exact(self, moving):

@@ -11,6 +11,7 @@ import llvmlite.binding
 import pytest
 
 from hydrone_gym import _jit
+from hydrone_gym.control.laws import LAWS
 from hydrone_gym.simulation.advance import compiled
 from hydrone_gym.simulation.storage import LANES
 
@@ -22,12 +23,12 @@ wide_x86_only = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module")
-def library():
+@pytest.fixture(scope="module", params=LAWS)
+def library(request):
     """Compiled anew, as Numba keeps no assembly of cached kernels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_jit, "cache_root", lambda: None)
-        return compiled.__wrapped__("paper", LANES)._library
+        return compiled.__wrapped__(request.param, LANES)._library
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hydrone_gym.control.laws import LAWS
 from hydrone_gym.simulation.advance import SPEED_BOUND
 from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.outcome import Outcome
@@ -18,6 +19,8 @@ from tests.simulation.closed_loop import ClosedLoop
 WORLD = World()
 OPEN = World(lower=(-1e3, -1e3, -1e3), upper=(1e3, 1e3, 1e3), rough_transition="count")
 VEHICLES = pytest.mark.parametrize("vehicle", [HYDRONE, HYDRONE_PHYSICAL], ids=lambda vehicle: vehicle.name)
+
+EITHER_LAW = pytest.mark.parametrize("law", LAWS)
 
 
 def random_spheres(rng, rows, count):
@@ -40,11 +43,12 @@ def equal(first, second):
     assert first.tobytes() == second.tobytes()
 
 
+@EITHER_LAW
 @VEHICLES
-def test_sixteen_lanes_equal_one(vehicle):
+def test_sixteen_lanes_equal_one(vehicle, law):
     rows, references, spheres = mission(np.random.default_rng(10))
-    many, near = play(Simulation(vehicle, WORLD, lanes=16), rows, references, spheres)
-    single = Simulation(vehicle, WORLD, lanes=1)
+    many, near = play(Simulation(vehicle, WORLD, lanes=16, law=law), rows, references, spheres)
+    single = Simulation(vehicle, WORLD, lanes=1, law=law)
     for i in range(len(rows)):
         one, distance = play(single, rows[i : i + 1], references[:, i : i + 1], spheres[i : i + 1])
         equal(one[0], many[i])
@@ -93,15 +97,16 @@ def test_trajectory_ends_where_whole_periods_end(vehicle):
         equal(states[-1], whole["state"][0])
 
 
+@EITHER_LAW
 @VEHICLES
 @pytest.mark.parametrize("height", [4.0, -3.0, 1.5, -1.5])
-def test_energy_and_states_equal_a_step_by_step_replay(vehicle, height):
+def test_energy_and_states_equal_a_step_by_step_replay(vehicle, height, law):
     """Shaft power summed outside the kernel, from the rotor speeds of every step."""
     rng = np.random.default_rng(14)
     start = np.array([0.0, 0.0, height, *np.zeros(9)])
     references = np.column_stack([rng.uniform(-1, 1, (12, 2)), np.full(12, -np.sign(height)), np.zeros(12)])
-    _, states, _, row = trajectory(Simulation(vehicle, OPEN), row_at(start), references)
-    loop = ClosedLoop(vehicle, OPEN, 0.5, start, [*start[:3], 0.0])
+    _, states, _, row = trajectory(Simulation(vehicle, OPEN, law=law), row_at(start), references)
+    loop = ClosedLoop(vehicle, OPEN, 0.5, start, [*start[:3], 0.0], law)
     energy, replay = 0.0, [start]
     water = height <= 0.0
     for state in loop.play(references, loop.advance_stepped):

@@ -14,7 +14,14 @@ from hydrone_gym.weather import waves
 from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.current import Eddies
 from hydrone_gym.weather.noise import Key, derived, kicks, normals
+from hydrone_gym.control.laws import LAWS
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.vehicle import HYDRONE
+from hydrone_gym.weather.weather import LEVELS
 from hydrone_gym.weather.wind import Gusts
+from hydrone_gym.world.world import World
+from tests.simulation.test_rows import equal, mission
+from tests.weather.outdoors import conditions_for, play_in_weather
 
 LANES = 16
 WIND = winds.wind_params(6.0, 1.0, True, 0.05)
@@ -86,6 +93,18 @@ def test_lanes_are_equal_to_one():
         together(numbers.ravel(), found)
         np.testing.assert_array_equal(found.reshape(NUMBERS, LANES), expected)
         assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_sixteen_rows_in_weather_equal_one(law):
+    rows, references, spheres = mission(np.random.default_rng(8), count=40, periods=8)
+    flown = {}
+    for lanes in (1, LANES):
+        conditions = conditions_for(rows, lanes, LEVELS[3])
+        simulation = Simulation(HYDRONE, World(), lanes=lanes, law=law, weathered=True)
+        flown[lanes] = play_in_weather(simulation, rows, references, conditions, spheres)
+    equal(flown[1][0], flown[LANES][0])
+    equal(flown[1][1], flown[LANES][1])
 
 
 @pytest.mark.skipif(
