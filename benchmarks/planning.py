@@ -51,8 +51,8 @@ class Arguments:
     """Numbers of spheres: 20 of 0.5-1.5 m, or 40 of 0.8-1.8 m radius."""
     vehicle: Literal["paper", "physical", "hydrone-agile"] = "paper"
     """Parameter set."""
-    objective: Literal["time", "energy", "length", "paper"] = "time"
-    """What the planner minimises."""
+    objective: float | Literal["time", "energy", "length", "paper"] = "time"
+    """What the planner minimises; a number is what a second is worth in joules (W)."""
     iterations: int = 100
     """Samples a cycle."""
     latency: bool = False

@@ -38,8 +38,9 @@ class CLRRT(PlannerPolicy):
         belief: the `Belief`, or any model, to plan with.
         iterations: samples a cycle; results then depend on the seed alone.
         time_budget: seconds a cycle may take instead (the paper's real-time loop; not reproducible).
-        objective: what a path costs: "time" (s), "energy" (J), "length" (m), or "paper": the branch that ends closest
-            to the goal, crossing where the line to a sample meets the transition zone.
+        objective: what a path costs: "time" (s), "energy" (J), a number (how many joules a second is worth, W), "length"
+            (m), or "paper": the branch that ends closest to the goal, crossing where the line to a sample meets the
+            transition zone. Where joules count, so does how fast to swim.
         latency: True to use in each period what was planned during the one before, from the predicted state, as a
             vehicle must whose planning takes a whole period; it flies slower, to stop within what it sensed then.
         seed: of the random stream; every episode starts it anew.
@@ -55,7 +56,7 @@ class CLRRT(PlannerPolicy):
         *,
         iterations: int = 100,
         time_budget: float | None = None,
-        objective: str = "time",
+        objective: str | float = "time",
         latency: bool = False,
         seed: int = 0,
         settings: CLRRTSettings | None = None,
@@ -73,7 +74,7 @@ class CLRRT(PlannerPolicy):
         self.latency = latency
         self.settings = CLRRTSettings() if settings is None else settings
         envelope = self.belief.envelope
-        costs = objective_params(envelope, objective)
+        costs = objective_params(self.simulation, objective)
         self.cruise_speed = safe_speed(self.simulation, 2 if latency else 1)
         self._constants = Constants(packed(envelope), self._packed_settings(objective != "paper"), packed(costs))
 
