@@ -38,7 +38,7 @@ class CLRRT(PlannerPolicy):
         belief: the `Belief`, or any model, to plan with.
         iterations: samples a cycle; results then depend on the seed alone.
         time_budget: seconds a cycle may take instead (the paper's real-time loop; not reproducible).
-        objective: what a path costs: "time" (s), "energy" (J), a number (how many joules a second is worth, W), "length"
+        objective: what a path costs: "time" (s), "energy" (J), a number (joules that a second is worth, W), "length"
             (m), or "paper": the branch that ends closest to the goal, crossing where the line to a sample meets the
             transition zone. Where joules count, so does how fast to swim.
         latency: True to use in each period what was planned during the one before, from the predicted state, as a
