@@ -8,7 +8,7 @@ from hydrone_gym._jit import inlined, routine
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.edge import left_to_go
-from planners.cl_rrt.extend import GOAL_SAMPLE, extend, in_sight
+from planners.cl_rrt.extend import extend, in_sight
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import OPEN, node_state
 from planners.stop_check import AIR_GATE, WATER_GATE
@@ -19,6 +19,7 @@ STRAIGHT_ON = 0
 CAREFUL = 1  # also short steps around the vehicle
 ANY_MEDIUM = 2  # also crossings that the mission does not need: the way out of a pocket may lead through them
 # Kinds of samples
+GOAL_SAMPLE = 0
 COLUMN_SAMPLE = 1
 CAREFUL_SAMPLE = 2  # near the root, with short steps
 POINT_SAMPLE = 3

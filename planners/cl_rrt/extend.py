@@ -14,7 +14,6 @@ from planners.cl_rrt.tree import OPEN, node_state
 from planners.clearance import clearance_between
 from planners.stop_check import AIR_GATE, WATER_GATE
 
-GOAL_SAMPLE = 0  # the kind of a sample that is the goal
 _AIR_REACHED = 0.4  # m
 _WATER_REACHED = 0.5  # m: more than the hold radius
 
@@ -27,7 +26,8 @@ def aim_at(p, s, sample):
     if change and p.objective.paper > 0.0:  # where the line to the sample meets the gate
         share = (s.z - gate) / (s.z - sample.z)
         return Point(s.x + share * (sample.x - s.x), s.y + share * (sample.y - s.y), gate), change
-    if change and p.objective.per_joule > 0.0 and sample.kind == GOAL_SAMPLE:  # where that costs least on this line
+    goal = p.check.goal
+    if change and p.objective.per_joule > 0.0 and sample.x == goal.x and sample.y == goal.y:  # where that costs least
         x, y = crossing_point(s.x, s.y, s.z, sample.x, sample.y, sample.z, p.objective.rates)
         return Point(x, y, gate), change
     return Point(sample.x, sample.y, gate if change else sample.z), change
@@ -89,7 +89,8 @@ def extend(p, source, size, sample, limit, step):
                 break
             size = grown
             current = size - 1
-            if is_air(goal.z) == is_air(node_state(p, current).z) and not p.objective.paper > 0.0:
+            there = is_air(goal.z) == is_air(node_state(p, current).z)
+            if there and p.objective.paper == 0.0 and p.objective.per_joule == 0.0:  # slow swims would fill the tree
                 sample = Point(goal.x, goal.y, goal.z)  # what it was crossed for
             if p.nodes[current].goal:
                 break
