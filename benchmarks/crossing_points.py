@@ -74,12 +74,12 @@ def crossed(flight: Flight, zone: float) -> Crossed:
     return Crossed(point, legs, turned, apart, start, goal, flight.energy, share)
 
 
-def fly_columns(scenarios: list[Scenario], objective: str) -> list[Crossed]:
+def fly_columns(scenarios: list[Scenario], objective: str | float, controller: str = "paper") -> list[Crossed]:
     """Fly every world with one objective; those that arrive count."""
-    env = gym.make("HydroneGym/Mission-v0")
+    env = gym.make("HydroneGym/Mission-v0", controller=controller)
     planner: Any = CLRRT.for_env(env, objective=objective)
     zone = env.get_wrapper_attr("world").zone
-    flights = (fly(env, planner, scenario=scenario) for scenario in tqdm(scenarios, desc=objective, leave=False))
+    flights = (fly(env, planner, scenario=scenario) for scenario in tqdm(scenarios, desc=str(objective), leave=False))
     return [crossed(flight, zone) for flight in flights if flight.outcome is Outcome.GOAL]
 
 

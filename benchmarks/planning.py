@@ -58,8 +58,8 @@ class Arguments:
     """What a crossing may be."""
     period: float = 0.5
     """Seconds between references."""
-    objective: Literal["time", "energy", "length", "paper"] = "time"
-    """What the planner minimises."""
+    objective: float | Literal["time", "energy", "length", "paper"] = "time"
+    """What the planner minimises; a number is what a second is worth in joules (W)."""
     iterations: int = 100
     """Samples a cycle."""
     latency: bool = False

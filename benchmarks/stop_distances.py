@@ -33,9 +33,8 @@ def main() -> None:
     parser.add_argument("--controllers", nargs="+", choices=tuple(LAWS), default=["paper"], help="control laws")
     laws = parser.parse_args().controllers
     several = len(laws) > 1
-    print(
-        f"| set |{' law |' if several else ''} medium | stop distance m at speed m/s | cruise speed m/s | with latency |"
-    )
+    law_too = " law |" if several else ""
+    print(f"| set |{law_too} medium | stop distance m at speed m/s | cruise speed m/s | with latency |")
     print(f"|---|{'---|' if several else ''}---|---|---|---|")
     for vehicle in (HYDRONE, HYDRONE_PHYSICAL, HYDRONE_AGILE):
         for law in laws:

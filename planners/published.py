@@ -65,7 +65,8 @@ class PublishedCLRRT(PlannerPolicy):
         self._settings = CLRRTSettings(margin=0.0)
         envelope = self._belief.envelope
         params = self._settings.params(_SPEED_SHARE * envelope.cruise * self._belief.period)
-        self._constants = Constants(packed(envelope), packed(params), packed(objective_params(envelope, "paper")))
+        costs = objective_params(self._simulation, "paper")
+        self._constants = Constants(packed(envelope), packed(params), packed(costs))
 
     def act(self, now: Known, memory: PublishedMemory | None) -> tuple[NDArray[np.float64], PublishedMemory]:
         """Run one cycle of the execution loop; return the reference (4,) and the new memory."""

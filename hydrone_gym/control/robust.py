@@ -20,8 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hydrone_gym._jit import inlined
+from hydrone_gym.control.approach import HOVER_BAND, flow_near, profile, surface_limits, too_fast, way_left
 from hydrone_gym.control.envelope import Envelope, shaft_power_at
 from hydrone_gym.control.law import Law, register
+from hydrone_gym.control.mixing import mix_air, mix_water
 from hydrone_gym.control.paper import shorten, signed_root
 from hydrone_gym.control.reference import Integral, clamp
 from hydrone_gym.physics.dynamics import step
@@ -31,11 +33,6 @@ from hydrone_gym.vehicle import RobustGains, Vehicle
 
 RobustGainParams = namedtuple("RobustGainParams", [spec.name for spec in fields(RobustGains)])  # type: ignore[misc]
 _LEAST_LIFT = 3.0  # m/s^2 of upward thrust that tilt is reckoned with, whatever the vehicle falls with
-_HOVER_BAND = 0.15  # m above the surface in which a vehicle waits that is too fast to cross
-_FORESEEN = 0.25  # s for which waves go on as they do
-_BRAKED = 0.5  # share of the braking that the approach to the surface reckons with
-_SMOOTH = 0.65  # share of the lateral speed of a rough crossing above which a vehicle waits
-_TILT_BAND = 0.65  # m above that over which tilt is given back
 _STILL = 0.06  # m/s through the water that is not worth a turn
 _ASTRAY = 0.6  # rad off course at which a vehicle under water only turns
 _MOST_FLOW = 1.0  # m/s of water that is believed
@@ -49,14 +46,6 @@ class Observed(NamedTuple):
     y: float
     z: float
     yaw: float
-
-
-@inlined
-def profile(distance, gain, braking):
-    """Return the speed (m/s) to come to rest after a distance (m), and how fast it falls with it (1/s)."""
-    near = braking / (gain * gain)
-    far = np.sqrt(2.0 * braking * max(distance - 0.5 * near, 0.5 * near))
-    return (gain * distance, gain) if distance < near else (far, braking / far)
 
 
 @inlined
@@ -111,99 +100,6 @@ def steer(now, gains, flow, limit):
 
 
 @inlined
-def flow_near(now, world):
-    """Velocity and its rate (x, y in m/s and m/s^2) of the water for a vehicle in the transition zone, else zero."""
-    water, near = now.surface, abs(now.state.z) <= world.zone
-    return (
-        water.vx if near else 0.0,
-        water.vy if near else 0.0,
-        water.ax if near else 0.0,
-        water.ay if near else 0.0,
-    )
-
-
-@inlined
-def way_left(now, gains):
-    """Return how far (m) a vehicle is from where it waits for the surface, and how many seconds it needs there."""
-    height = max(abs(now.state.z - now.surface.elevation) - _HOVER_BAND, 0.0)
-    return height, height / max(abs(now.state.vz), gains.zone_speed_limit)
-
-
-@inlined
-def too_fast(now, gains, flow, seconds, world):
-    """Return by how much (m/s) the lateral speed through the water will exceed that of a smooth crossing."""
-    soon = min(seconds + _HOVER_BAND / gains.zone_speed_limit, _FORESEEN)
-    vx, vy = now.state.vx - flow[0] - soon * flow[2], now.state.vy - flow[1] - soon * flow[3]
-    return np.sqrt(vx * vx + vy * vy) - _SMOOTH * world.rough_speed
-
-
-@inlined
-def surface_limits(now, gains, flow, world):
-    """Return limits above the water: lateral speed (m/s), descent (m/s), and tangent of the tilt.
-
-    Nobody reaches the surface faster than the crossing may be, sideways or downwards: who is too fast comes down as
-    fast as braking takes, and waits above the water for the rest.
-    """
-    height, seconds = way_left(now, gains)
-    excess = too_fast(now, gains, flow, seconds, world)
-    smooth = gains.crossing_share * world.rough_speed
-    fastest = np.sqrt(gains.zone_speed_limit * gains.zone_speed_limit + 2.0 * gains.zone_braking * height)
-    descent, braking = min(fastest, gains.descent_limit), _BRAKED * gains.braking
-    descent = min(descent, height * gains.braking / excess) if excess > 0.0 else descent
-    crosses = now.reference.z <= 0.0
-    limit = min(gains.speed_limit, smooth + braking * seconds) if crosses else gains.speed_limit
-    cosine = world.rough_cos_tilt
-    level = gains.level_share * np.sqrt(1.0 - cosine * cosine) / cosine
-    share = clamp(height / _TILT_BAND, 0.0, 1.0)
-    return 0.0 if now.vertical else limit, descent, level + (gains.tilt_limit - level) * share
-
-
-@inlined
-def mix_air(lift, roll, pitch, yaw, vehicle, medium):
-    """Return four rotor speeds (rpm) for a lift (N) and moments (N m): roll and pitch first, then lift, then yaw."""
-    most = medium.thrust * medium.rotor_max * medium.rotor_max
-    half = 0.5 / vehicle.arm
-    a, b = clamp(half * roll, -0.5 * most, 0.5 * most), clamp(half * pitch, -0.5 * most, 0.5 * most)
-    uneven = max(abs(a), abs(b))
-    each = clamp(0.25 * lift, uneven, most - uneven)
-    room = min(each, most - each) - uneven
-    c = clamp(0.25 * yaw / vehicle.yaw_arm_air, -room, room)
-    scale = 1.0 / medium.thrust
-    return (
-        _speed(each - b + c, scale, medium),
-        _speed(each + a - c, scale, medium),
-        _speed(each + b + c, scale, medium),
-        _speed(each - a - c, scale, medium),
-    )
-
-
-@inlined
-def mix_water(lift, pitch, push, yaw, vehicle, medium):
-    """Return four rotor speeds (rpm) for forces up and ahead (N) and moments (N m): 1 and 3 level, 2 and 4 heading first.
-
-    Pitch never takes more than 0.3 of a rotor's thrust: the vehicle rights itself.
-    """
-    most = medium.thrust * medium.rotor_max * medium.rotor_max
-    half = 0.5 / vehicle.arm
-    n, m = clamp(half * yaw, -most, most), clamp(half * pitch, -0.3 * most, 0.3 * most)
-    room = most - abs(n)
-    each, deep = clamp(0.5 * push, -room, room), clamp(0.5 * lift, abs(m) - most, most - abs(m))
-    scale = 1.0 / medium.thrust
-    return (
-        _speed(deep - m, scale, medium),
-        _speed(each + n, scale, medium),
-        _speed(deep + m, scale, medium),
-        _speed(each - n, scale, medium),
-    )
-
-
-@inlined
-def _speed(force, scale, medium):
-    """Rotor speed (rpm) of a thrust (N), within the rotor's limits."""
-    return clamp(signed_root(force * scale), medium.rotor_min, medium.rotor_max)
-
-
-@inlined
 def tilt_wanted(now, disturbance, model):
     """Return the wanted roll and pitch (rad), and the thrust upwards (m/s^2)."""
     gains, state, attitude, reference = model.gains, now.state, now.attitude, now.reference
@@ -216,7 +112,7 @@ def tilt_wanted(now, disturbance, model):
     slowing = -slope * (state.vz - reference.vz) if wanted == climb else 0.0
     slowing = (
         gains.zone_braking
-        if wanted < -descent and state.z - now.surface.elevation > _HOVER_BAND and descent < gains.descent_limit
+        if wanted < -descent and state.z - now.surface.elevation > HOVER_BAND and descent < gains.descent_limit
         else slowing
     )
     up = clamp(gains.height_d * (climb - state.vz) + slowing, -gains.height_braking, gains.height_braking)

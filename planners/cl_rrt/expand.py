@@ -31,6 +31,7 @@ _ROAM_HEIGHT = 1.5  # m
 _NEAR = 2.0  # m
 _CAREFUL_SHARE = 0.3  # of the usual step: slow enough to leave a gap that is hardly wider than the vehicle
 _OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it bounds from below what a path may cost
+_MEASURED = 0.97  # the same where joules count: that cost-to-go allows for nothing
 _MEETING_SHARE = 0.5  # of the columns
 _WALL = 0.5  # m: samples keep this far from the walls
 
@@ -78,9 +79,9 @@ def draw_near(p, draws, k):
 
 @inlined
 def draw_column(p, draws, k, roam):
-    """Sample a crossing column near the water-side end; the point lies at the goal's height on the far side.
+    """Sample a crossing column near the water-side end, where joules count along the whole way; roaming, at the root.
 
-    Roaming, the columns lie around the root and the point just beyond the surface.
+    The point lies just beyond the surface.
     """
     w, root, goal = p.check.world, node_state(p, 0), p.check.goal
     from_air = is_air(root.z)
@@ -88,7 +89,11 @@ def draw_column(p, draws, k, roam):
     cx = goal.x if at_goal else root.x
     cy = goal.y if at_goal else root.y
     share, angle = draws[k + 4], between(draws[k + 3], -np.pi, np.pi)
-    if share < _MEETING_SHARE:  # where the swim takes as long as the dive, in the half that faces the other end
+    if p.objective.per_joule > 0.0 and roam != ANY_MEDIUM:
+        cx, cy = between(draws[k + 5], root.x, goal.x), between(draws[k + 5], root.y, goal.y)
+        sine, cosine = sincos(angle)
+        radius = p.settings.column_radius * share
+    elif share < _MEETING_SHARE:  # where the swim takes as long as the dive, in the half that faces the other end
         dx, dy = root.x + goal.x - 2.0 * cx, root.y + goal.y - 2.0 * cy
         across, (s, c) = max(np.sqrt(dx * dx + dy * dy), 1e-9), sincos(0.5 * angle)
         cosine, sine = (dx * c - dy * s) / across, (dx * s + dy * c) / across
@@ -178,7 +183,8 @@ def worth_trying(p, i, sample, best):
     """Whether an extension of node i toward a sample could beat the best path, and is not seen to be blocked."""
     s, o = node_state(p, i), p.objective
     via = cost_to_go(s.x, s.y, s.z, sample.x, sample.y, sample.z, o) + left_to_go(p, sample)
-    if p.settings.prune > 0.0 and p.nodes[i].cost + _OPTIMISM * via >= best:
+    via *= _OPTIMISM if o.per_joule == 0.0 else _MEASURED
+    if p.settings.prune > 0.0 and p.nodes[i].cost + via >= best:
         return False
     seek = sample.kind <= COLUMN_SAMPLE and not o.paper > 0.0
     return not seek or in_sight(p, i, sample)
@@ -217,6 +223,9 @@ def expand_tree(p, size, draws, iterations, roam):
                 continue
             grown = extend(p, i, size, sample, limit, step)
             if grown > size:
+                if sample.kind == GOAL_SAMPLE and p.objective.per_joule > 0.0:  # from these it would go the same way
+                    for j in range(size, grown):
+                        p.nodes[j].tried = 1
                 size = grown
                 end = p.nodes[size - 1]
                 best = min(best, end.cost) if end.goal else best

@@ -8,6 +8,7 @@ from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.crossing import column_is_free, cross, facing
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge, zone_edge
+from planners.cl_rrt.objective import crossing_point
 from planners.cl_rrt.references import air_reference, water_reference
 from planners.cl_rrt.tree import OPEN, node_state
 from planners.clearance import clearance_between
@@ -18,19 +19,6 @@ _WATER_REACHED = 0.5  # m: more than the hold radius
 
 
 @inlined
-def in_sight(p, i, sample):
-    """Whether the straight way from a node to a point, through the column above or below it, clears what is known.
-
-    A line costs a hundredth of the edges along it, so tries that would end at an obstacle are not begun.
-    """
-    s = node_state(p, i)
-    change = is_air(s.z) != is_air(sample.z)
-    z = (AIR_GATE if is_air(s.z) else -WATER_GATE) if change else sample.z
-    near = clearance_between((s.x, s.y, s.z), (sample.x, sample.y, z), p.check.lane, 0, p.check.radius)
-    return near >= p.margin and (not change or column_is_free(p, sample.x, sample.y))
-
-
-@inlined
 def aim_at(p, s, sample):
     """Return the `Point` to go to for a sample, and whether the surface lies between: then the gate before it."""
     change = is_air(s.z) != is_air(sample.z)
@@ -38,7 +26,23 @@ def aim_at(p, s, sample):
     if change and p.objective.paper > 0.0:  # where the line to the sample meets the gate
         share = (s.z - gate) / (s.z - sample.z)
         return Point(s.x + share * (sample.x - s.x), s.y + share * (sample.y - s.y), gate), change
+    goal = p.check.goal
+    if change and p.objective.per_joule > 0.0 and sample.x == goal.x and sample.y == goal.y:  # where that costs least
+        x, y = crossing_point(s.x, s.y, s.z, sample.x, sample.y, sample.z, p.objective.rates)
+        return Point(x, y, gate), change
     return Point(sample.x, sample.y, gate if change else sample.z), change
+
+
+@inlined
+def in_sight(p, i, sample):
+    """Whether the straight way from a node to a point, through the column above or below it, clears what is known.
+
+    A line costs a hundredth of the edges along it, so tries that would end at an obstacle are not begun.
+    """
+    s = node_state(p, i)
+    aim, change = aim_at(p, s, sample)
+    near = clearance_between((s.x, s.y, s.z), (aim.x, aim.y, aim.z), p.check.lane, 0, p.check.radius)
+    return near >= p.margin and (not change or column_is_free(p, aim.x, aim.y))
 
 
 @inlined
@@ -85,7 +89,8 @@ def extend(p, source, size, sample, limit, step):
                 break
             size = grown
             current = size - 1
-            if is_air(goal.z) == is_air(node_state(p, current).z) and not p.objective.paper > 0.0:
+            there = is_air(goal.z) == is_air(node_state(p, current).z)
+            if there and p.objective.paper == 0.0 and p.objective.per_joule == 0.0:  # slow swims would fill the tree
                 sample = Point(goal.x, goal.y, goal.z)  # what it was crossed for
             if p.nodes[current].goal:
                 break

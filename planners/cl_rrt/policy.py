@@ -38,8 +38,9 @@ class CLRRT(PlannerPolicy):
         belief: the `Belief`, or any model, to plan with.
         iterations: samples a cycle; results then depend on the seed alone.
         time_budget: seconds a cycle may take instead (the paper's real-time loop; not reproducible).
-        objective: what a path costs: "time" (s), "energy" (J), "length" (m), or "paper": the branch that ends closest
-            to the goal, crossing where the line to a sample meets the transition zone.
+        objective: what a path costs: "time" (s), "energy" (J), a number (joules that a second is worth, W), "length"
+            (m), or "paper": the branch that ends closest to the goal, crossing where the line to a sample meets the
+            transition zone. Where joules count, so does how fast to swim.
         level: of the weather to be ready for, 0 to 5. Above 0 it estimates the disturbance from what it observes,
             predicts with that, and keeps farther from everything, see `planners.caution.caution_at`.
         latency: True to use in each period what was planned during the one before, from the predicted state, as a
@@ -57,7 +58,7 @@ class CLRRT(PlannerPolicy):
         *,
         iterations: int = 100,
         time_budget: float | None = None,
-        objective: str = "time",
+        objective: str | float = "time",
         level: int = 0,
         latency: bool = False,
         seed: int = 0,
@@ -79,8 +80,9 @@ class CLRRT(PlannerPolicy):
         margins = CLRRTSettings(margin=self.caution.edge_margin, rest_margin=self.caution.rest_margin)
         self.settings = margins if settings is None else settings
         envelope = self.belief.envelope
-        costs = objective_params(envelope, objective)
-        self.cruise_speed = safe_speed(self.belief.simulation(), 2 if latency else 1)
+        calm = self.belief.simulation()
+        costs = objective_params(calm, objective)
+        self.cruise_speed = safe_speed(calm, 2 if latency else 1)
         self._constants = Constants(packed(envelope), self._packed_settings(objective != "paper"), packed(costs))
 
     def _packed_settings(self, prune: bool) -> NDArray[np.float64]:

@@ -10,9 +10,6 @@ from hydrone_gym.simulation.storage import REFERENCE, Pose
 from planners.stop_check import AIR_GATE, WATER_GATE, inside, state_of
 
 _LEAD = 0.75  # s at cruise speed it may be ahead: a reference that runs away drags the vehicle through obstacles
-_CLIMB = 0.6  # m of height an edge of 0.5 s may change
-_CARROT_TIME = 1.4  # s of travel ahead under water
-_CLIMB_TIME = 1.0  # s the same in height
 _CARROT_TURNING = 0.6  # m ahead while misaligned: beyond the hold radius, too near to swim an arc
 _ALIGNED = 0.94  # cosine of the misalignment (20 degrees) below which the vehicle turns in place
 
@@ -23,7 +20,7 @@ def air_reference(p, vessel, aim, psi, step):
     s, old = state_of(vessel), view(vessel, REFERENCE, Pose)
     dx, dy, dz = aim.x - old.x, aim.y - old.y, aim.z - old.z
     across = np.sqrt(dx * dx + dy * dy)
-    scale = min(1.0, step / max(across, 1e-9), _CLIMB * p.check.period / 0.5 / max(abs(dz), 1e-9))
+    scale = min(1.0, step / max(across, 1e-9), p.objective.lead.climb / max(abs(dz), 1e-9))
     rx, ry, rz = old.x + scale * dx, old.y + scale * dy, old.z + scale * dz
     lx, ly, lz = rx - s.x, ry - s.y, rz - s.z
     lead = np.sqrt(lx * lx + ly * ly + lz * lz)
@@ -37,14 +34,15 @@ def air_reference(p, vessel, aim, psi, step):
 @inlined
 def water_reference(p, vessel, aim):
     """Place a carrot ahead of the vehicle toward a point in water: from the state, never from the old reference."""
-    s, speeds = state_of(vessel), p.objective.speeds
+    s, o = state_of(vessel), p.objective
     dx, dy = aim.x - s.x, aim.y - s.y
     distance = np.sqrt(dx * dx + dy * dy)
     sine, cosine = sincos(s.psi)
     along = abs(dx * cosine + dy * sine) / max(distance, 1e-9)  # the vehicle drives both ways
-    ahead = speeds.water * _CARROT_TIME if along > _ALIGNED else _CARROT_TURNING
+    ahead = o.lead.ahead if along > _ALIGNED else _CARROT_TURNING
     scale = min(1.0, ahead / max(distance, 1e-9))
-    climb = speeds.dive * _CLIMB_TIME
-    rz = min(s.z + clamp(aim.z - s.z, -climb, climb), -WATER_GATE)
+    # where joules count it dives or rises gently, all along the way
+    slope = min(1.0, o.speeds.water * p.check.period / max(distance, 1e-9)) if o.per_joule > 0.0 else 1.0
+    rz = min(s.z + clamp(slope * (aim.z - s.z), -o.lead.down, o.lead.up), -WATER_GATE)
     rx, ry, rz = inside(p.check, s.x + scale * dx, s.y + scale * dy, rz)
     return rx, ry, rz, s.psi

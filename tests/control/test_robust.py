@@ -1,4 +1,4 @@
-"""The robust law in an instant: its mixing against the wrench of the rotors, its profile, its observer, its symmetries."""
+"""The robust law in an instant: mixing against the wrench of the rotors, profile, observer, symmetries."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from hydrone_gym._jit import kernel
 from hydrone_gym.control import robust
-from hydrone_gym.control.robust import mix_air, mix_water
+from hydrone_gym.control.mixing import mix_air, mix_water
 from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.physics.rotors import rotor_thrusts, rotor_wrench
 from hydrone_gym.simulation.simulation import Simulation

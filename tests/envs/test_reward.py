@@ -63,4 +63,4 @@ def test_time_and_slow():
 def test_reward_and_planners_share_one_time_to_go(vehicle):
     speeds = list(pack_task(Simulation(vehicle, World()), 120.0, slice(0, 1))["speeds"][0])
     np.testing.assert_array_equal(speeds, cruise_speeds(envelope_of(vehicle)))
-    np.testing.assert_array_equal(speeds, objective_params(envelope_of(vehicle), "time").rates)
+    np.testing.assert_array_equal(speeds, objective_params(Simulation(vehicle, World()), "time").rates)

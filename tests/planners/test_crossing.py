@@ -16,7 +16,7 @@ from hydrone_gym.simulation.simulation import Simulation, row_at, trajectory
 from hydrone_gym.simulation.storage import VESSEL
 from hydrone_gym.world.world import World
 from planners import CLRRT
-from planners.cl_rrt.edge import ZONE_SPEED
+from planners.caution import CALM
 from planners.cl_rrt.stopping import safe_speed, stop_distances
 from planners.cl_rrt.tree import CROSSING, OPEN
 from tests.planners.flights import fly as flown_by
@@ -42,7 +42,7 @@ def test_moves_vertically_inside_the_zone(mission, vehicle, period):
         inside = np.flatnonzero(np.abs(flight.trace.states[1:, 2]) <= World().zone)
         inside = inside[: np.flatnonzero(np.append(np.diff(inside), 2) > 1)[0] + 1]  # until it first leaves the zone
         assert len(inside) * TICK > 2.0
-        assert np.linalg.norm(flight.trace.states[1 + inside, 6:8], axis=1).max() <= ZONE_SPEED
+        assert np.linalg.norm(flight.trace.states[1 + inside, 6:8], axis=1).max() <= CALM.crossing_speed
         # the reference stays in its column, but in the periods in which the vehicle enters and leaves the zone
         moves = np.linalg.norm(np.diff(flight.trace.references[:, :2], axis=0), axis=1) > 1e-6
         assert not moves[inside[ticks:-ticks]].any()

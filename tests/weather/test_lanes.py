@@ -9,14 +9,14 @@ import pytest
 
 from hydrone_gym import _jit
 from hydrone_gym._jit import inlined, kernel
+from hydrone_gym.control.laws import LAWS
+from hydrone_gym.simulation.simulation import Simulation
+from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.weather import current as currents
 from hydrone_gym.weather import waves
 from hydrone_gym.weather import wind as winds
 from hydrone_gym.weather.current import Eddies
 from hydrone_gym.weather.noise import Key, derived, kicks, normals
-from hydrone_gym.control.laws import LAWS
-from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.vehicle import HYDRONE
 from hydrone_gym.weather.weather import LEVELS
 from hydrone_gym.weather.wind import Gusts
 from hydrone_gym.world.world import World
