@@ -4,7 +4,7 @@ from functools import partial
 from typing import Any
 
 from agents.agent import load_agent
-from planners.named import WEATHER
+from planners.named import level_of
 from planners.shield import Shield
 
 ppo = partial(load_agent, "ppo")
@@ -19,7 +19,7 @@ def ppo_shield(env: Any) -> Shield:
 
 def ppo_shield_weather(env: Any) -> Shield:
     """Return the same behind a shield that is ready for weather."""
-    return Shield.for_env(load_agent("ppo-shield", env), env, level=WEATHER)
+    return Shield.for_env(load_agent("ppo-shield", env), env, level=level_of(env))
 
 
 def sac_shield(env: Any) -> Shield:

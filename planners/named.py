@@ -2,16 +2,24 @@
 
 from typing import Any
 
+from hydrone_gym.weather.weather import LEVELS
 from planners.cl_rrt.policy import CLRRT
 from planners.shield import Shield
 from planners.straight_line import StraightLine
 
-WEATHER = 3  # the level that named policies are ready for
+_UNNAMED = 3  # the level that is assumed of weather that is none of the levels
+
+
+def level_of(env: Any) -> int:
+    """Return the level of weather that an environment is made for, which is announced, as its vehicle is."""
+    first = env.envs[0] if hasattr(env, "envs") else env
+    weather = first.unwrapped.options.the_weather
+    return LEVELS.index(weather) if weather in LEVELS else _UNNAMED
 
 
 def clrrt_weather(env: Any, seed: int = 0) -> CLRRT:
-    """Return the CL-RRT that is ready for weather, for an environment."""
-    return CLRRT.for_env(env, level=WEATHER, seed=seed)
+    """Return the CL-RRT that is ready for an environment's level of weather."""
+    return CLRRT.for_env(env, level=level_of(env), seed=seed)
 
 
 def straight_line_shield(env: Any) -> Shield:
