@@ -22,6 +22,7 @@ from planners.stop_check import AIR_GATE, WATER_GATE, inside
 
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate
+_OF_DRIFT = 0.5  # share of it that spheres are kept at: they are smaller than walls
 _ROUNDING = 0.5  # m: a vehicle stops not quite where the column was drawn
 _CLEAR_OF_ZONE = 0.02  # m
 _BRAKE = 0.75  # s of braking after which another way to brake is tried
@@ -52,9 +53,10 @@ def facing(x, y, to_x, to_y, psi):
 
 
 @inlined
-def column_is_free(p, x, y):
-    """Whether a vertical path through the zone clears every known obstacle."""
-    return clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), p.check.lane, 0, p.check.radius) >= p.margin
+def column_is_free(p, x, y, down):
+    """Whether a vertical path through the zone clears every known obstacle, and a drift into the water most of it."""
+    room = p.margin + (_OF_DRIFT * p.settings.drift if down else 0.0)
+    return clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), p.check.lane, 0, p.check.radius) >= room
 
 
 @inlined
@@ -221,7 +223,7 @@ def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     s = node_state(p, source)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1]) or (is_air(s.z) and near_wall(p, column[0], column[1])):
+    if not column_is_free(p, column[0], column[1], is_air(s.z)) or (is_air(s.z) and near_wall(p, column[0], column[1])):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)

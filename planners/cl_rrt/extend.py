@@ -42,7 +42,7 @@ def in_sight(p, i, sample):
     s = node_state(p, i)
     aim, change = aim_at(p, s, sample)
     near = clearance_between((s.x, s.y, s.z), (aim.x, aim.y, aim.z), p.check.lane, 0, p.check.radius)
-    return near >= p.margin and (not change or column_is_free(p, aim.x, aim.y))
+    return near >= p.margin and (not change or column_is_free(p, aim.x, aim.y, is_air(s.z)))
 
 
 @inlined
