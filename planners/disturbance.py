@@ -2,9 +2,9 @@
 
 Each period the belief, with the estimate so far, is flown from the state that was observed toward the reference that
 was in force. Where the velocity and the place that came differ, the estimate is corrected by that difference over the
-belief's own sensitivity to wind, current and push: a damped Gauss-Newton step, filtered. Air and water have an estimate
-each, and that of the other medium is kept. In a world that is as believed nothing differs, so the estimate is zero,
-exactly.
+belief's own sensitivity to wind, current and push: a damped Gauss-Newton step, filtered. What the vehicle is not in
+changes nothing, so its estimate is kept; but where a law perceives the surface, the drift above it tells of the
+current. In a world that is as believed nothing differs, so the estimate is zero, exactly.
 """
 
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from hydrone_gym.surface import in_air
 from planners.belief import Belief
 from planners.policy import Known
 
-_NEAR_SURFACE = 0.3  # m: nearer, waves and a hull partly under water push more than what goes on
+_NEAR_SURFACE = 0.15  # m: nearer, waves and a hull partly under water push more than what goes on
 _GAIN = 0.63  # share of a correction that is made in a period
 # Of wind (m/s), push in air (N), current (m/s) and push in water (N):
 _STEP = np.array([1.0, 1.0, 0.5, 0.05, 0.05, 0.5])  # what the sensitivity is measured with
@@ -76,23 +76,19 @@ class Estimator:
     def _corrected(self, before: Sight, now: Known) -> NDArray[np.float64]:
         """Return the estimate after a period that led from `before` to `now`."""
         estimate, z = before.estimate, np.array([before.state[2], now.state[2]])
-        air = bool(in_air(z[1]))
-        if (in_air(z) != air).any() or np.abs(z).min() < _NEAR_SURFACE:
+        if in_air(z[0]) != in_air(z[1]) or np.abs(z).min() < _NEAR_SURFACE:
             return estimate
         error = self._moved(now.state) - self._moved(self._predicted(before, now, estimate))
         if not error.any():
             return estimate
-        own = np.arange(3) + (0 if air else 3)
-        sensitivity = np.empty((6, 3))
-        for column, k in enumerate(own):
+        sensitivity = np.empty((6, 6))  # zero where an estimate is of the medium the vehicle is not in
+        for k in range(6):
             step = np.where(np.arange(6) == k, _STEP, 0.0)
             further, back = (self._predicted(before, now, estimate + sign * step) for sign in (1.0, -1.0))
-            sensitivity[:, column] = 0.5 * (self._moved(further) - self._moved(back))
-        damped = sensitivity.T @ sensitivity + _NOISE**2 * np.eye(3)
-        wanted = np.linalg.solve(damped, sensitivity.T @ error) * _STEP[own]
-        corrected = estimate.copy()
-        corrected[own] += _GAIN * np.clip(wanted, -_MOST_STEP[own], _MOST_STEP[own])
-        return np.clip(corrected, -_MOST, _MOST)
+            sensitivity[:, k] = 0.5 * (self._moved(further) - self._moved(back))
+        damped = sensitivity.T @ sensitivity + _NOISE**2 * np.eye(6)
+        wanted = np.linalg.solve(damped, sensitivity.T @ error) * _STEP
+        return np.clip(estimate + _GAIN * np.clip(wanted, -_MOST_STEP, _MOST_STEP), -_MOST, _MOST)
 
     def _predicted(self, before: Sight, now: Known, estimate: NDArray[np.float64]) -> NDArray[np.float64]:
         """Predict the state (12,) now under an estimate."""
