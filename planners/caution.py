@@ -20,7 +20,6 @@ class Caution(NamedTuple):
     room: float  # from the walls, m; references 0.1 m more
     crossing_speed: float  # lateral limit of crossings that are planned, m/s; rough is 0.2
     crossing_tilt: float  # rad; rough is 5 degrees
-    apart: float  # m from its column that a vehicle may begin a water entry
     drift: float  # m from the walls that a water entry keeps: what an unknown current carries a vehicle until it swims
 
 
@@ -32,12 +31,10 @@ def caution_at(level: Any) -> Caution:
     if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= LEVELS:
         raise ValueError(f"level must be a whole number from 0 to {LEVELS}, got {level!r}")
     if level == 0:
-        # what is left between vehicle and column would pull it sideways inside the zone
-        return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.12, 0.0)
+        return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.0)
     share = level / _TUNED
     margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
-    # wind holds the vehicle beside its reference, and inside the zone it brakes and is not pulled
-    return Caution(*margins, 0.15, math.radians(4.5), 0.5, _CURRENT * level * _TURN)
+    return Caution(*margins, 0.15, math.radians(4.5), _CURRENT * level * _TURN)
 
 
 CALM = caution_at(0)

@@ -27,7 +27,6 @@ class SettingParams(NamedTuple):
     room: float  # distance (m) to keep from the walls
     crossing_speed: float  # limits of planned crossings: lateral, m/s
     crossing_cos_tilt: float
-    apart: float  # m from its column that a vehicle may begin a water entry
     drift: float  # m from the walls that a water entry keeps
 
 
@@ -92,5 +91,5 @@ class CLRRTSettings:
         """
         values = (getattr(self, name) for name in SettingParams._fields[: SettingParams._fields.index("step")])
         plain = (float(value) if isinstance(value, bool) else value for value in values)
-        rules = caution.room, caution.crossing_speed, math.cos(caution.crossing_tilt), caution.apart, caution.drift
+        rules = caution.room, caution.crossing_speed, math.cos(caution.crossing_tilt), caution.drift
         return SettingParams._make([*plain, step, float(prune), *rules])
