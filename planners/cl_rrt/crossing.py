@@ -22,7 +22,7 @@ from planners.stop_check import AIR_GATE, WATER_GATE, inside
 
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate
-_OF_DRIFT = 0.5  # share of it that spheres are kept at: they are smaller than walls
+OF_DRIFT = 0.5  # share of it that spheres are kept at: they are smaller than walls
 _ROUNDING = 0.5  # m: a vehicle stops not quite where the column was drawn
 _CLEAR_OF_ZONE = 0.02  # m
 _BRAKE = 0.75  # s of braking after which another way to brake is tried
@@ -55,7 +55,7 @@ def facing(x, y, to_x, to_y, psi):
 @inlined
 def column_is_free(p, x, y, down):
     """Whether a vertical path through the zone clears every known obstacle, and a drift into the water most of it."""
-    room = p.margin + (_OF_DRIFT * p.settings.drift if down else 0.0)
+    room = p.margin + (OF_DRIFT * p.settings.drift if down else 0.0)
     return clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), p.check.lane, 0, p.check.radius) >= room
 
 

@@ -16,6 +16,7 @@ from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.surface import is_air
+from planners.cl_rrt.crossing import OF_DRIFT
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
@@ -89,7 +90,8 @@ def prune_blocked(p, size, known_before):
     for i in range(1, size):
         a, b = node_state(p, p.nodes[i].parent), node_state(p, i)
         near = clearance_between((a.x, a.y, a.z), (b.x, b.y, b.z), p.check.lane, known_before, p.check.radius)
-        if near < p.margin - _BEND:
+        entering = p.nodes[i].kind == CROSSING and not is_air(p.check.goal.z)
+        if near < p.margin - _BEND + (OF_DRIFT * p.settings.drift if entering else 0.0):
             p.nodes[i].dead = 1
     prune_orphans(p, size)
 
