@@ -10,6 +10,7 @@ from hydrone_gym._jit import inlined
 from hydrone_gym.control.reference import clamp
 
 HOVER_BAND = 0.15  # m above the surface in which a vehicle waits that is too fast to cross
+_EVADING = 4.0  # 1/s: how fast a waiting vehicle goes back up there
 _FORESEEN = 0.25  # s for which waves go on as they do
 _BRAKED = 0.5  # share of the braking that the approach to the surface reckons with
 _SMOOTH = 0.65  # share of the lateral speed of a rough crossing above which a vehicle waits
@@ -56,14 +57,19 @@ def surface_limits(now, gains, flow, world):
     """Return limits above the water: lateral speed (m/s), descent (m/s), and tangent of the tilt.
 
     Nobody reaches the surface faster than the crossing may be, sideways or downwards: who is too fast comes down as
-    fast as braking takes, and waits above the water for the rest.
+    fast as braking takes, and waits above the water for the rest, going up again where the surface rises. A little too
+    fast is a little slower down: a hull that waits half in the water is tipped over.
     """
     height, seconds = way_left(now, gains)
     excess = too_fast(now, gains, flow, seconds, world)
     smooth = gains.crossing_share * world.rough_speed
     fastest = np.sqrt(gains.zone_speed_limit * gains.zone_speed_limit + 2.0 * gains.zone_braking * height)
     descent, braking = min(fastest, gains.descent_limit), _BRAKED * gains.braking
-    descent = min(descent, height * gains.braking / excess) if excess > 0.0 else descent
+    below = HOVER_BAND - (now.state.z - now.surface.elevation)
+    share = 1.0 - excess / ((1.0 - _SMOOTH) * world.rough_speed)
+    nearby = share * fastest if share > 0.0 else -_EVADING * below
+    slower = height * gains.braking / excess if below < 0.0 else nearby
+    descent = min(descent, slower) if excess > 0.0 else descent
     crosses = now.reference.z <= 0.0
     limit = min(gains.speed_limit, smooth + braking * seconds) if crosses else gains.speed_limit
     cosine = world.rough_cos_tilt

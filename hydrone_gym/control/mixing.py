@@ -7,7 +7,10 @@ from hydrone_gym.control.reference import clamp
 
 @inlined
 def mix_air(lift, roll, pitch, yaw, vehicle, medium):
-    """Return four rotor speeds (rpm) for a lift (N) and moments (N m): roll and pitch first, then lift, then yaw."""
+    """Return four rotor speeds (rpm) for a lift (N) and moments (N m): roll and pitch first, then lift, then yaw.
+
+    It never yaws for the sake of lift: what only a yawing moment would make room for is not given.
+    """
     most = medium.thrust * medium.rotor_max * medium.rotor_max
     half = 0.5 / vehicle.arm
     a, b = clamp(half * roll, -0.5 * most, 0.5 * most), clamp(half * pitch, -0.5 * most, 0.5 * most)

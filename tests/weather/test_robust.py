@@ -78,11 +78,11 @@ def crossings(law, level, start, mode="vertical"):
 
 @pytest.mark.parametrize("mode", ["vertical", "adaptive"])
 @pytest.mark.parametrize("start", [2.0, -2.5], ids=["entry", "exit"])
-@pytest.mark.parametrize(("level", "most"), [(1, 0), (2, 2), (3, 7)])
+@pytest.mark.parametrize(("level", "most"), [(1, 0), (2, 1), (3, 6)])
 def test_it_crosses_smoothly_in_weather(level, most, start, mode):
     rows, rough = crossings("robust", level, start, mode)
     assert rough.sum() <= most
-    assert (np.sign(rows["state"][:, 2]) == -np.sign(start)).sum() >= FLIGHTS - 1
+    assert (np.sign(rows["state"][:, 2]) == -np.sign(start)).sum() >= FLIGHTS - 4  # who waits for a lull
     assert rows["crossings"].max() == 1
 
 
@@ -91,16 +91,13 @@ def test_the_papers_law_crosses_roughly_in_weather(start):
     assert crossings("paper", 2, start)[1].sum() >= FLIGHTS / 4
 
 
-@pytest.mark.parametrize("height", [0.0, 0.1], ids=["abrupt", "blended"])
-def test_rotors_that_turn_early_bring_it_out_of_the_water(height):
+@pytest.mark.parametrize("hull", [0.0, 0.1], ids=["abrupt", "blended"])
+def test_rotors_that_turn_early_bring_it_out_of_the_water(hull):
     """At once, whatever the lag and however late it notices; without them some fall back and bob."""
-    through = {}
-    for pre_spin in (HYDRONE.robust_gains.pre_spin, 0.0):
-        vehicle = replace(HYDRONE, robust_gains=replace(HYDRONE.robust_gains, pre_spin=pre_spin))
-        settings = [(lag, delay) for lag in (0.0, 0.033, 0.1) for delay in (0.0, 0.05, 0.1, 0.2)]
-        through[pre_spin] = sum(exits_at_once(vehicle, height, lag, delay) for lag, delay in settings)
-    assert next(iter(through.values())) == 12
-    assert height > 0.0 or list(through.values())[1] < 12
+    settings = [(hull, lag, delay) for lag in (0.0, 0.033, 0.1) for delay in (0.0, 0.05, 0.1, 0.2)]
+    late = replace(HYDRONE, robust_gains=replace(HYDRONE.robust_gains, pre_spin=0.0))
+    assert all(exits_at_once(HYDRONE, *setting) for setting in settings)
+    assert hull > 0.0 or not all(exits_at_once(late, *setting) for setting in settings)
 
 
 def exits_at_once(vehicle, height, lag, delay):
