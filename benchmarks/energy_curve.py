@@ -72,8 +72,10 @@ def draw(results: dict[str, list[Point]], worlds: int) -> Figure:
         figure.set_layout_engine("constrained")
         for column, (mission, points) in zip(axes.T, results.items()):
             plot(column[0], points, "energy")
-            for point in points[1:-1]:
-                column[0].annotate(point.label, (point.time, point.energy), (7, 5), textcoords="offset points")
+            for k, point in enumerate(points[1:-1]):  # on either side in turn: they may lie close
+                offset, side = ((7, 5), "left") if k % 2 else ((-7, -14), "right")
+                place = point.time, point.energy
+                column[0].annotate(point.label, place, offset, textcoords="offset points", ha=side)
             plot(column[1], points, "share")
             column[0].set_title(MISSIONS[mission])
             column[1].set(xlabel="median time (s)", ylim=(0.0, 100.0))
