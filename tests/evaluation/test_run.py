@@ -185,7 +185,7 @@ def test_agrees_with_flying_all_worlds_in_one_batch():
     assert {row.length for row in batch} == {None}
     assert {row.policy for row in batch if row.interventions} == {"straight-line+shield"}
     assert all(0.0 < row.decision_ms_p50 <= row.decision_ms_max for row in batch)
-    whole = {row.key: replace(row, length=None) for row in timeless(alone)}
+    whole = {row.key: replace(row, length=None, zone_speed=None) for row in timeless(alone)}
     assert {row.key: row for row in timeless(batch)} == whole
     mission, options = suite.missions[0], {**suite.missions[0].options, "vehicle": "physical"}
     rows = gym.make_vec(mission.env_id, num_envs=6, vectorization_mode="vector_entry_point", **options)

@@ -103,7 +103,7 @@ def test_overwriting_begins_anew(finished, tmp_path):
             b"water-to-air,0,",
             "there must be no row, or no second one, of ('paper-20-v1', 'water-to",
         ),
-        (b"\n", b"\n\n", "line 2: there must be 22 cells, got 0"),
+        (b"\n", b"\n\n", "line 2: there must be 23 cells, got 0"),
     ],
 )
 def test_damaged_rows_are_told_and_left_alone(finished, tmp_path, old, new, message):
