@@ -54,11 +54,11 @@ def interquartile_mean(values: ArrayLike, confidence: float = 0.95) -> Estimate:
 
     Raises ValueError for no values, or values that are not finite.
     """
-    return trimmed_mean(values, _TRIMMED, confidence)
+    return mean(values, _TRIMMED, confidence)
 
 
-def trimmed_mean(values: ArrayLike, trimmed: float, confidence: float = 0.95) -> Estimate:
-    """Return what `interquartile_mean` does with another share cut off at each end: 0.0 for the mean of all values."""
+def mean(values: ArrayLike, trimmed: float = 0.0, confidence: float = 0.95) -> Estimate:
+    """Return the mean of the values, less the share `trimmed` at each end, as `interquartile_mean` does."""
     numbers = np.asarray(values, dtype=np.float64).ravel()
     if numbers.size == 0 or not np.isfinite(numbers).all():
         raise ValueError(f"there must be at least one value, and finite ones, got {numbers.tolist()}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from hydrone_gym.evaluation.bounds import Bound
 from hydrone_gym.evaluation.records import Record
-from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, paired_success, trimmed_mean, wilson_interval
+from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, mean, paired_success, wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.world import World
 
@@ -190,7 +190,7 @@ def _gap(arrived: Sequence[Record], bounds: Bounds, rule: str) -> float | None:
 def _score(records: Sequence[Record], bounds: Bounds) -> Estimate | None:
     """Return the mean of success x bound / clip(time, bound, `SLOWEST` x bound), without the rule of the zone."""
     scores = [r.success / min(max(multiple, 1.0), SLOWEST) for r, multiple in _bounded(records, bounds, "free")]
-    return trimmed_mean(scores, 0.0) if scores else None
+    return mean(scores) if scores else None
 
 
 def _bounded(records: Sequence[Record], bounds: Bounds, rule: str) -> list[tuple[Record, float]]:

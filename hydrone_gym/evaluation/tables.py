@@ -30,8 +30,8 @@ class Table(NamedTuple):
 def tables_of(summaries: Sequence[MissionSummary]) -> list[Table]:
     """Return tables of each mission.
 
-    They say how flights ended, crossed and decided, what arriving took, how much more that is than the bound and the score, whether
-    the rule of the zone was kept, and all less the baseline.
+    They say how flights ended, crossed and decided, what arriving took, how much more that is than the bound and the
+    score, whether the rule of the zone was kept, and all less the baseline.
     """
     tables = []
     for s in summaries:
@@ -86,7 +86,8 @@ def _measures(p: PolicySummary) -> tuple[str, ...]:
 
 def _bounded(p: PolicySummary) -> tuple[str, ...]:
     gaps = cell(p.gap, 1, 100.0, "+"), cell(p.gap_kept, 1, 100.0, "+")
-    return (p.policy, cell(p.score, 3), *gaps, cell(p.zone_kept, 1, 100.0), cell(p.zone_speed, 3), cell(p.zone_speed_max, 3))
+    zone = cell(p.zone_kept, 1, 100.0), cell(p.zone_speed, 3), cell(p.zone_speed_max, 3)
+    return (p.policy, cell(p.score, 3), *gaps, *zone)
 
 
 def _decision(p: PolicySummary) -> tuple[str, ...]:
