@@ -54,17 +54,22 @@ def interquartile_mean(values: ArrayLike, confidence: float = 0.95) -> Estimate:
 
     Raises ValueError for no values, or values that are not finite.
     """
+    return mean(values, _TRIMMED, confidence)
+
+
+def mean(values: ArrayLike, trimmed: float = 0.0, confidence: float = 0.95) -> Estimate:
+    """Return the mean of the values, less the share `trimmed` at each end, as `interquartile_mean` does."""
     numbers = np.asarray(values, dtype=np.float64).ravel()
     if numbers.size == 0 or not np.isfinite(numbers).all():
         raise ValueError(f"there must be at least one value, and finite ones, got {numbers.tolist()}")
     from scipy.stats import bootstrap, trim_mean
 
-    value = float(trim_mean(numbers, _TRIMMED))
+    value = float(trim_mean(numbers, trimmed))
     if numbers.size < 2 or np.ptp(numbers) == 0.0:
         end = value if numbers.size > 1 else None
         return Estimate(value, end, end)
     options = {"n_resamples": RESAMPLES, "batch": max(1, _AT_ONCE // numbers.size), "rng": np.random.default_rng(0)}
-    statistic = partial(trim_mean, proportiontocut=_TRIMMED)
+    statistic = partial(trim_mean, proportiontocut=trimmed)
     resampled = bootstrap((numbers,), statistic, confidence_level=confidence, method="percentile", **options)
     return Estimate(value, *map(float, resampled.confidence_interval))
 

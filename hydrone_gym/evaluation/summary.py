@@ -9,13 +9,14 @@ import numpy as np
 
 from hydrone_gym.evaluation.bounds import Bound
 from hydrone_gym.evaluation.records import Record
-from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, paired_success, wilson_interval
+from hydrone_gym.evaluation.statistics import Estimate, interquartile_mean, mean, paired_success, wilson_interval
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.world.world import World
 
 ALL_MISSIONS = "all missions"
 BASELINE = "clrrt"  # policy that the others are compared with unless another is named
 LIMITS = World()  # of a rough crossing, the same in every environment
+SLOWEST = 8.0  # times the bound: a flight that arrives later scores no less, as in the BARN challenge
 Bounds = Mapping[tuple[str, str, int], Bound]  # of worlds, by suite, mission and number
 
 
@@ -47,6 +48,7 @@ class PolicySummary:
     zone_speed_max: float | None  #: the largest of all
     gap: float | None  #: of its time over the bound, as a share of that: median over the worlds it solved that have one
     gap_kept: float | None  #: likewise over the bound that keeps the rule of the zone
+    score: Estimate | None  #: mean over the worlds that have a bound, 95 % bootstrap interval; 0 to 1, see `_score`
     interventions: float | None  #: of the shield, mean a flight; None without a shield
     decision_ms_p50: float  #: median over flights of each flight's percentile, ms
     decision_ms_p99: float
@@ -172,6 +174,7 @@ def _policy(name: str, records: Sequence[Record], bounds: Bounds) -> PolicySumma
         zone_speed_max=max(zone_speed, default=None),
         gap=_gap(arrived, bounds, "free"),
         gap_kept=_gap(arrived, bounds, "kept"),
+        score=_score(records, bounds),
         interventions=float(np.mean(interventions)) if interventions else None,
         decision_ms_p50=float(np.median(there("decision_ms_p50"))),
         decision_ms_p99=float(np.median(there("decision_ms_p99"))),
@@ -180,11 +183,20 @@ def _policy(name: str, records: Sequence[Record], bounds: Bounds) -> PolicySumma
 
 def _gap(arrived: Sequence[Record], bounds: Bounds, rule: str) -> float | None:
     """Return the median share by which flights were slower than the bound, with the `rule` of the zone kept or free."""
-    gaps = []
-    for record in arrived:
-        flight = getattr(bounds.get(record.key[:3]), rule, None)
-        gaps += [] if flight is None else [record.time / flight.time - 1.0]
+    gaps = [multiple - 1.0 for _, multiple in _bounded(arrived, bounds, rule)]
     return float(np.median(gaps)) if gaps else None
+
+
+def _score(records: Sequence[Record], bounds: Bounds) -> Estimate | None:
+    """Return the mean of success x bound / clip(time, bound, `SLOWEST` x bound), without the rule of the zone."""
+    scores = [r.success / min(max(multiple, 1.0), SLOWEST) for r, multiple in _bounded(records, bounds, "free")]
+    return mean(scores) if scores else None
+
+
+def _bounded(records: Sequence[Record], bounds: Bounds, rule: str) -> list[tuple[Record, float]]:
+    """Return the flights in worlds that have a bound, each with its time in multiples of that."""
+    flights = [(record, getattr(bounds.get(record.key[:3]), rule, None)) for record in records]
+    return [(record, record.time / flight.time) for record, flight in flights if flight is not None]
 
 
 def _is_rough(record: Record) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from hydrone_gym.evaluation.statistics import Estimate
-from hydrone_gym.evaluation.summary import LIMITS, Comparison, MissionSummary, PolicySummary
+from hydrone_gym.evaluation.summary import LIMITS, SLOWEST, Comparison, MissionSummary, PolicySummary
 from hydrone_gym.rendering.comparison import shortened
 
 _WIDTH = 120  # characters that every table fits in; an overview fits in 80
@@ -30,8 +30,8 @@ class Table(NamedTuple):
 def tables_of(summaries: Sequence[MissionSummary]) -> list[Table]:
     """Return tables of each mission.
 
-    They say how flights ended, crossed and decided, what arriving took, how much more that is than the bound, whether
-    the rule of the zone was kept, and all less the baseline.
+    They say how flights ended, crossed and decided, what arriving took, how much more that is than the bound and the
+    score, whether the rule of the zone was kept, and all less the baseline.
     """
     tables = []
     for s in summaries:
@@ -40,7 +40,7 @@ def tables_of(summaries: Sequence[MissionSummary]) -> list[Table]:
             (_OUTCOMES, s.policies),
             (_CROSSINGS, crossed),
             (_ARRIVED, s.policies),
-            (_BOUND, tuple(p for p in s.policies if p.gap is not None or p.zone_kept is not None)),
+            (_BOUND, tuple(p for p in s.policies if p.score is not None or p.zone_kept is not None)),
             (_DECISIONS, s.policies),
             (_DIFFERENCES, s.comparisons),
         )
@@ -86,7 +86,8 @@ def _measures(p: PolicySummary) -> tuple[str, ...]:
 
 def _bounded(p: PolicySummary) -> tuple[str, ...]:
     gaps = cell(p.gap, 1, 100.0, "+"), cell(p.gap_kept, 1, 100.0, "+")
-    return (p.policy, *gaps, cell(p.zone_kept, 1, 100.0), cell(p.zone_speed, 3), cell(p.zone_speed_max, 3))
+    zone = cell(p.zone_kept, 1, 100.0), cell(p.zone_speed, 3), cell(p.zone_speed_max, 3)
+    return (p.policy, cell(p.score, 3), *gaps, *zone)
 
 
 def _decision(p: PolicySummary) -> tuple[str, ...]:
@@ -152,13 +153,16 @@ _ARRIVED = _Kind(
 _BOUND = _Kind(
     "gap to the bound, and the rule of the zone",
     (
-        *("policy", "over the\nbound (%)", "over the bound\nwith rule (%)", "keeps the rule (%)"),
+        *("policy", "score", "over the\nbound (%)", "over the bound\nwith rule (%)", "keeps the rule (%)"),
         *("lateral speed\nin the zone (m/s)", "largest\n(m/s)"),
     ),
     _bounded,
     (
         "Bound: time of the fastest flight that a search found in the world, known in full; no proof that none is "
         f"faster. Over it: median over the worlds that have a bound and were solved; {NONE} where none has.",
+        f"Score: 0 for a flight that did not arrive, else the bound over its time, from 1 (at the bound or sooner) to "
+        f"{1.0 / SLOWEST:g} ({SLOWEST:g} times it or later); mean over the worlds that have a bound, with its 95 % "
+        f"bootstrap interval; {NONE} where none has.",
         f"Rule of the zone: within ±{LIMITS.zone:g} m of the surface move vertically only. Kept: at most "
         f"{LIMITS.rough_speed:g} m/s sideways all through it; share of these flights, with its 95 % Wilson interval.",
         "Lateral speed in the zone: each flight's largest, median over these flights. Largest: of all flights.",

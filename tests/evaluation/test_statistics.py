@@ -6,7 +6,7 @@ import statistics
 import numpy as np
 import pytest
 
-from hydrone_gym.evaluation.statistics import interquartile_mean, paired_success, percentiles, wilson_interval
+from hydrone_gym.evaluation.statistics import interquartile_mean, mean, paired_success, percentiles, wilson_interval
 
 
 def wilson_by_hand(k, n, z):
@@ -69,6 +69,14 @@ def test_the_bootstrap_interval_covers():
         low <= middle <= high for _, low, high in (interquartile_mean(random.exponential(1.0, 40)) for _ in range(200))
     )
     assert 178 <= held <= 199
+
+
+def test_the_mean_of_all_values_has_an_interval_too():
+    values = [0.0, 0.5, 1.0, 1.0] * 25
+    value, low, high = mean(values)
+    reach = 1.96 * statistics.pstdev(values) / 10.0  # the normal law's for a hundred values
+    assert value == 0.625
+    assert (low, high) == pytest.approx((value - reach, value + reach), abs=0.01)
 
 
 def test_few_or_equal_values():
