@@ -58,6 +58,8 @@ class Arguments:
     """What a crossing may be."""
     period: float = 0.5
     """Seconds between references."""
+    cruise: float | None = None
+    """Lateral speed limit of the robust law in m/s, in the place of its own."""
     objective: float | Literal["time", "energy", "length", "paper"] = "time"
     """What the planner minimises; a number is what a second is worth in joules (W)."""
     iterations: int = 100
@@ -86,7 +88,10 @@ def law_of(name: str, density: int) -> ScenarioLaw:
 def fly_some(name: str, density: int, seeds: list[int], a: Arguments) -> list[Flown]:
     """Fly the worlds of some seeds; save those that do not end at the goal."""
     vehicle = named_vehicle(a.vehicle)
-    options: dict[str, Any] = {"vehicle": a.vehicle, "controller": a.controller, "crossing": a.crossing}
+    if a.cruise is not None:
+        gains = dataclasses.replace(vehicle.robust_gains, speed_limit=a.cruise)
+        vehicle = dataclasses.replace(vehicle, robust_gains=gains)
+    options: dict[str, Any] = {"vehicle": vehicle, "controller": a.controller, "crossing": a.crossing}
     options |= {"period": a.period, "num_obstacles": density, "disable_env_checker": True}
     env = gym.make("HydroneGym/Mission-v0", **options)
     planner: Any = CLRRT.for_env(env, iterations=a.iterations, objective=a.objective, latency=a.latency)
