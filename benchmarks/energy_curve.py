@@ -77,6 +77,8 @@ def draw(results: dict[str, list[Point]], worlds: int) -> Figure:
                 place = point.time, point.energy
                 column[0].annotate(point.label, place, offset, textcoords="offset points", ha=side)
             plot(column[1], points, "share")
+            low, high = column[1].get_xlim()
+            column[1].set_xlim(low - 0.06 * (high - low), high)  # room for the labels on the left
             column[0].set_title(MISSIONS[mission])
             column[1].set(xlabel="median time (s)", ylim=(0.0, 100.0))
         axes[0, 0].set_ylabel("median energy (J)")
