@@ -7,7 +7,7 @@ from planners.stop_check import MARGIN
 
 LEVELS = 5
 _CURRENT = 0.1  # m/s a level
-_TURN = 7.0  # s to leave the zone and turn against a current
+_TURN = 10.0  # s to leave the zone and turn against a current
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
 
 

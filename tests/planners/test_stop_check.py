@@ -172,7 +172,7 @@ def test_in_weather_more_is_kept_from_walls_and_spheres():
             "room": 0.15,
             "crossing_speed": 0.15,
             "crossing_tilt": np.radians(4.5),
-            "drift": 2.1,
+            "drift": 3.0,
         }
     )
 
