@@ -1,6 +1,6 @@
 """Search for the fastest flights of frozen worlds, known in full, and freeze them beside the suites.
 
-    python -m benchmarks.bounds --worlds 50                      # paper-20, the first 50 worlds of both missions
+    python -m benchmarks.bounds                                  # paper-20, 100 worlds of both missions
     python -m benchmarks.bounds --vehicle physical --out /tmp    # another vehicle
 
 A world takes about three seconds of one core. Flights are printed as they are found, medians at the end.

@@ -10,7 +10,7 @@ from hydrone_gym.evaluation.plan import make_plan
 from hydrone_gym.simulation.outcome import Outcome
 
 WORLDS = (0, 7)
-FROZEN = 50  # worlds of each mission
+FROZEN = 100  # worlds of each mission
 
 
 class Replay:
