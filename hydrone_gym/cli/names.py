@@ -31,5 +31,7 @@ class List:
             print(json.dumps(names, indent=1))
             return 0
         for kind, each in names.items():
-            print(textwrap.fill("  ".join(each), 80, initial_indent=f"{kind:<10}", subsequent_indent=" " * 10))
+            first, rest = f"{kind:<10}", " " * 10
+            words = "  ".join(each)
+            print(textwrap.fill(words, 80, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False))
         return 0
