@@ -112,7 +112,9 @@ def _ray(stack: contextlib.ExitStack, jobs: int | None) -> None:
 
     register_ray()
     if not ray.is_initialized():
-        local: dict[str, Any] = {} if "RAY_ADDRESS" in os.environ else {"num_cpus": jobs, "include_dashboard": False}
+        # "local": a cluster that was killed leaves its address in a file, which Ray would connect to
+        local: dict[str, Any] = {"address": "local", "num_cpus": jobs, "include_dashboard": False}
+        local = {} if "RAY_ADDRESS" in os.environ else local
         ray.init(logging_level=logging.ERROR, log_to_driver=False, **local)
         stack.callback(ray.shutdown)
 

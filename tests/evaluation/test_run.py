@@ -1,11 +1,14 @@
 """Evaluations give the same rows however they are run."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import joblib
@@ -124,9 +127,10 @@ if __name__ == "__main__":
     print("".join(map(to_line, records)), end="")
 """
 RAY = """
-    import ray
+    import atexit, ray
     from ray.cluster_utils import Cluster
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    atexit.register(cluster.shutdown)
     cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
     ray.init(address=cluster.address, log_to_driver=False)
@@ -146,6 +150,19 @@ def test_rows_of_a_script_are_those_of_a_serial_run(serial, tmp_path, backend, b
     assert done.returncode == 0, done.stderr
     lines = done.stdout.partition("ROWS\n")[2].splitlines()
     assert timeless(map(from_line, lines)) == timeless(serial)
+
+
+def test_a_cluster_that_was_killed_is_not_sought(serial, tmp_path):
+    """It leaves its address in a file, and Ray connects to what that says unless it is told otherwise."""
+    with tempfile.TemporaryDirectory(prefix="ray", dir="/tmp") as folder:  # short: sockets lie in it
+        place = Path(folder) / "ray" / "ray_current_cluster"
+        place.parent.mkdir()
+        place.write_text("127.0.0.1:1")
+        script = tmp_path / "script.py"
+        script.write_text(SCRIPT % ("", FEW["policies"], FEW["worlds"], "ray"))
+        done = completed([sys.executable, script], 300.0, env={**os.environ, "RAY_TMPDIR": folder})
+    assert done.returncode == 0, done.stderr
+    assert timeless(map(from_line, done.stdout.partition("ROWS\n")[2].splitlines())) == timeless(serial)
 
 
 class Moody:
