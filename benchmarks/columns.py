@@ -16,10 +16,9 @@ from hydrone_gym._jit import inlined, kernel, unit
 from hydrone_gym._memory import call, gather, offsets_of, packed, pointer, scatter, select, size_of
 from hydrone_gym.control.laws import named_law
 from hydrone_gym.physics.kinematics import State, attitude_of
-from hydrone_gym.simulation.advance import begin_tick, end_tick, substep
+from hydrone_gym.simulation.advance import begin_ticks, end_tick, substep
 from hydrone_gym.simulation.clock import DT, SUBSTEPS, TICK
 from hydrone_gym.simulation.conditions import CONDITIONS, begin_conditions, climate_of
-from hydrone_gym.simulation.in_weather import any_rare, sample
 from hydrone_gym.simulation.outcome import RUNNING
 from hydrone_gym.simulation.rows import set_move
 from hydrone_gym.simulation.simulation import ticks_in
@@ -62,7 +61,7 @@ class Passage(NamedTuple):
     cos_tilt: float  # least
 
 
-class Surface(NamedTuple):
+class Touched(NamedTuple):
     """What was seen of its crossings: number, and the worst of them until the vehicle is through the zone."""
 
     crossings: float
@@ -75,7 +74,7 @@ class Watched(NamedTuple):
     """Both."""
 
     passage: Passage
-    surface: Surface
+    surface: Touched
 
 
 SEEN = offsets_of(Watched)
@@ -106,10 +105,10 @@ def watch(b, i, lanes, seen, time, zone):
 @inlined
 def watch_surface(b, i, lanes, seen):
     """Look at the crossings of lane i's tick before it is judged."""
-    c, s = gather(b, LANE_AT.crossing, i, lanes, Crossing), gather(seen, SEEN.surface, i, lanes, Surface)
+    c, s = gather(b, LANE_AT.crossing, i, lanes, Crossing), gather(seen, SEEN.surface, i, lanes, Touched)
     crossed = c.number > 0.0 and gather(b, OUTCOME, i, lanes, float) == RUNNING
     counts = crossed and gather(seen, SEEN.passage, i, lanes, Passage).left == np.inf
-    noted = Surface(
+    noted = Touched(
         s.crossings + (c.number if crossed else 0.0),
         c.speed2 if counts and c.speed2 > s.speed2 else s.speed2,
         c.cos_tilt if counts and c.cos_tilt < s.cos_tilt else s.cos_tilt,
@@ -128,11 +127,7 @@ def compiled(law: str) -> Any:
         inverses = (1.0 / (ticks * SUBSTEPS), 1.0 / (ticks * TICK))
         width = lanes if ticks > 0 else 0
         for tick in range(ticks):
-            for i in range(width):
-                begin_tick(b, i, lanes)
-            rare = any_rare(weather, lanes)
-            for i in range(width):
-                sample(weather, i, lanes, b, rare, None)
+            begin_ticks(b, lanes, width, weather, None)
             for sub in range(SUBSTEPS):
                 part = (tick * SUBSTEPS + sub + 1, sub + 1)
                 for i in range(lanes):
@@ -239,7 +234,7 @@ def fly_column(vehicle: Vehicle, column: Column, weather: Weather | None = None,
     """Fly a vehicle as it is, under a law that believes the nominal one, through a column."""
     rows, path, conditions = ready(vehicle, column, weather or Weather())
     passage = Passage(0.0, 0.0, 0.0, math.copysign(1.0, column.start), np.inf, np.inf, 0.0, 0.0, 1.0)
-    first = packed(Watched(passage, Surface(0.0, 0.0, 1.0, np.nan)))
+    first = packed(Watched(passage, Touched(0.0, 0.0, 1.0, np.nan)))
     seen = np.tile(np.repeat(first, LANES), (len(conditions), 1))
     hold, most = (math.ceil(t / PERIOD - 1e-9) for t in (column.hold, column.hold + column.limit))
     times = np.array([hold, most, column.stop, ticks_in(PERIOD)], np.int64)
@@ -251,7 +246,7 @@ def fly_column(vehicle: Vehicle, column: Column, weather: Weather | None = None,
 
 def _flights(rows: np.ndarray, found: NDArray[np.float64], hold: float) -> Flights:
     """Name what was seen (n, numbers of `Watched`)."""
-    passage, surface = Passage(*found[:, : SEEN.surface].T), Surface(*found[:, SEEN.surface :].T)
+    passage, surface = Passage(*found[:, : SEEN.surface].T), Touched(*found[:, SEEN.surface :].T)
     tilt, surface_tilt = (np.arccos(np.minimum(least, 1.0)) for least in (passage.cos_tilt, surface.cos_tilt))
     return Flights(
         rows["outcome"].copy(),

@@ -3,10 +3,9 @@
 import math
 from typing import Any, NamedTuple
 
+from hydrone_gym.weather.weather import LEVELS
 from planners.stop_check import MARGIN
 
-LEVELS = 5
-_CURRENT = 0.1  # m/s a level
 _TURN = 10.0  # s to leave the zone and turn against a current
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
 
@@ -28,13 +27,13 @@ def caution_at(level: Any) -> Caution:
 
     A vehicle that leans against wind, or drifts in a current, cannot cross as smoothly as one in still weather.
     """
-    if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= LEVELS:
-        raise ValueError(f"level must be a whole number from 0 to {LEVELS}, got {level!r}")
+    if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level < len(LEVELS):
+        raise ValueError(f"level must be a whole number from 0 to {len(LEVELS) - 1}, got {level!r}")
     if level == 0:
         return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.0)
     share = level / _TUNED
     margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
-    return Caution(*margins, 0.15, math.radians(4.5), _CURRENT * level * _TURN)
+    return Caution(*margins, 0.15, math.radians(4.5), LEVELS[level].current * _TURN)
 
 
 CALM = caution_at(0)

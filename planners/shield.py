@@ -209,11 +209,7 @@ class Shield:
         count = len(proposed)
         if not np.isfinite(proposed).all():
             raise ValueError(f"proposed references must be finite, got {proposed}")
-        rows = new_rows(count)
-        for key in TOLD:
-            rows[key] = np.reshape(observation[key], rows[key].shape)
-        spheres = np.array(observation["obstacles"], np.float64, order="C").reshape(count, -1, 4)
-        spheres[spheres[:, :, 3] <= 0.0] = NOWHERE
+        rows, spheres = _read(observation, count)
         conditions = [self.estimator.conditions(sight) for sight in sights or (None,) * count]
         query = GuardQuery(
             rows=rows,
@@ -230,6 +226,16 @@ class Shield:
         rollout = Rollout(self.simulation, np.empty((spheres.shape[1], 4)), self.estimator.conditions(None))
         guard(query, rollout.memory, self._envelope, CANDIDATES, self._scratch)
         return query.sent, query.held, query.choice
+
+
+def _read(observation: Mapping[str, NDArray], count: int) -> tuple[np.ndarray, NDArray[np.float64]]:
+    """Return rows (n,) of dtype `ROW` as they were told, and the spheres (n, M, 4), unused ones `NOWHERE`."""
+    rows = new_rows(count)
+    for key in TOLD:
+        rows[key] = np.reshape(observation[key], rows[key].shape)
+    spheres = np.array(observation["obstacles"], np.float64, order="C").reshape(count, -1, 4)
+    spheres[spheres[:, :, 3] <= 0.0] = NOWHERE
+    return rows, spheres
 
 
 def _first_state(in_force: NDArray[np.float64], here: NDArray[np.float64]) -> ShieldState:

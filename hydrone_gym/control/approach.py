@@ -8,6 +8,7 @@ import numpy as np
 
 from hydrone_gym._jit import inlined
 from hydrone_gym.control.reference import clamp
+from hydrone_gym.surface import is_air
 
 HOVER_BAND = 0.15  # m above the surface in which a vehicle waits that is too fast to cross
 _EVADING = 4.0  # 1/s: how fast a waiting vehicle goes back up there
@@ -70,8 +71,8 @@ def surface_limits(now, gains, flow, world):
     nearby = share * fastest if share > 0.0 else -_EVADING * below
     slower = height * gains.braking / excess if below < 0.0 else nearby
     descent = min(descent, slower) if excess > 0.0 else descent
-    crosses = now.reference.z <= 0.0
-    limit = min(gains.speed_limit, smooth + braking * seconds) if crosses else gains.speed_limit
+    stays = is_air(now.reference.z)
+    limit = gains.speed_limit if stays else min(gains.speed_limit, smooth + braking * seconds)
     cosine = world.rough_cos_tilt
     level = gains.level_share * np.sqrt(1.0 - cosine * cosine) / cosine
     share = clamp(height / _TILT_BAND, 0.0, 1.0)

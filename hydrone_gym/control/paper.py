@@ -24,6 +24,8 @@ from hydrone_gym.vehicle import AirGains, Vehicle, WaterGains
 AirGainParams = namedtuple("AirGainParams", [spec.name for spec in fields(AirGains)])  # type: ignore[misc]
 WaterGainParams = namedtuple("WaterGainParams", [spec.name for spec in fields(WaterGains)])  # type: ignore[misc]
 
+_TILTING = 0.11  # s that a stop takes longer because the vehicle must tilt first
+
 
 class PaperGains(NamedTuple):
     """The gains of both media."""
@@ -189,9 +191,6 @@ def attitude_reference(now, gains):
 def pre_spin_of(gains):
     """Depth (m) above which the aerial rotors of a rising vehicle turn already."""
     return gains.air.pre_spin
-
-
-_TILTING = 0.11  # s that a stop takes longer because the vehicle must tilt first
 
 
 def _envelope_of(vehicle: Vehicle) -> Envelope:

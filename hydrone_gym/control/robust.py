@@ -29,6 +29,7 @@ from hydrone_gym.control.reference import Integral, clamp
 from hydrone_gym.physics.dynamics import step
 from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.physics.trigonometry import arctan, wrap
+from hydrone_gym.surface import is_air
 from hydrone_gym.vehicle import RobustGains, Vehicle
 
 RobustGainParams = namedtuple("RobustGainParams", [spec.name for spec in fields(RobustGains)])  # type: ignore[misc]
@@ -110,11 +111,8 @@ def tilt_wanted(now, disturbance, model):
     wanted = reference.vz + (speed if error > 0.0 else -speed)
     climb = clamp(wanted, -descent, gains.climb_limit)
     slowing = -slope * (state.vz - reference.vz) if wanted == climb else 0.0
-    slowing = (
-        gains.zone_braking
-        if wanted < -descent and state.z - now.surface.elevation > HOVER_BAND and descent < gains.descent_limit
-        else slowing
-    )
+    nearing = state.z - now.surface.elevation > HOVER_BAND and descent < gains.descent_limit
+    slowing = gains.zone_braking if wanted < -descent and nearing else slowing
     up = clamp(gains.height_d * (climb - state.vz) + slowing, -gains.height_braking, gains.height_braking)
     up = max(up - disturbance.z + now.medium.weight * now.medium.inverse_mass, _LEAST_LIFT)
     ax, ay = steer(now, gains, flow, limit)
@@ -188,7 +186,7 @@ def water_control(now, disturbance, model):
     lift = (upwards / medium.inverse_mass + medium.weight) / (attitude.c_phi * attitude.c_theta)
     level = -(gains.level_p * state.theta + gains.level_d * now.rates[1]) / medium.inverse_inertia_y
     surfacing = gains.crossing_share * model.world.rough_speed + gains.zone_braking * seconds
-    limit = min(gains.surge_limit, surfacing) if now.reference.z > 0.0 else gains.surge_limit
+    limit = min(gains.surge_limit, surfacing) if is_air(now.reference.z) else gains.surge_limit
     wanted, surge, off = course(now, disturbance, gains, limit)
     push = (gains.surge_d * (wanted - surge) + medium.drag_x * abs(wanted) * wanted) / medium.inverse_mass
     fastest = gains.turn_limit

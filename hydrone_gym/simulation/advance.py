@@ -124,6 +124,17 @@ def begin_tick(b, i, lanes):
 
 
 @inlined
+def begin_ticks(b, lanes, width, weather, extra):
+    """Begin a tick of all lanes, and move their weather on; `width` is that many, see `advance`."""
+    for i in range(width):
+        begin_tick(b, i, lanes)
+    if weather is not None:
+        rare = any_rare(weather, lanes)
+        for i in range(width):
+            sample(weather, i, lanes, b, rare, extra)
+
+
+@inlined
 def judge(b, i, lanes, w):
     """Return the outcome of lane i at the end of a tick, and whether its numbers mean anything; `w`: `WorldParams`."""
     s = gather(b, FLOWN_AT.state, i, lanes, State)
@@ -232,12 +243,7 @@ def advance(b, lanes, obstacles, closest, count, model, part, weather, extra):
     # all lanes; were it a constant to LLVM, it would unroll the short loops to scalars before it could vectorise them
     width = lanes if lanes == 1 or ticks > 0 else 0
     for tick in range(first, last):
-        for i in range(width):
-            begin_tick(b, i, lanes)
-        if weather is not None:
-            rare = any_rare(weather, lanes)
-            for i in range(width):
-                sample(weather, i, lanes, b, rare, extra)
+        begin_ticks(b, lanes, width, weather, extra)
         for sub in range(SUBSTEPS):
             part = (tick * SUBSTEPS + sub + 1, sub + 1)
             for i in range(lanes):

@@ -35,20 +35,31 @@ def cruise_speeds(envelope: Envelope) -> CruiseSpeeds:
 
 
 @inlined
+def same_medium(across, z, goal_z, speeds):
+    """Return what a way across (m) takes within one medium, while it climbs or dives."""
+    climbing = abs(goal_z - z)
+    same_air = max(across / speeds.air, climbing / speeds.climb)
+    same_water = max(across / speeds.water, climbing / speeds.dive)
+    return same_air if is_air(z) else same_water
+
+
+@inlined
+def heights_of(z, goal_z, speeds):
+    """Return what climbing to the gate in air and diving to that in water take, and how far (m) a crossing goes."""
+    from_air = is_air(z)
+    air_height = z if from_air else goal_z
+    water_height = goal_z if from_air else z
+    climb = max(air_height - GATE, 0.0) / speeds.climb
+    dive = max(-GATE - water_height, 0.0) / speeds.dive
+    return climb, dive, min(air_height, GATE) - max(water_height, -GATE)
+
+
+@inlined
 def time_to_go(x, y, z, goal_x, goal_y, goal_z, speeds):
     """Return the time in s from a position to the goal (m), media and crossing considered, obstacles not."""
     dx, dy = goal_x - x, goal_y - y
     across = np.sqrt(dx * dx + dy * dy)
-    from_air, to_air = is_air(z), is_air(goal_z)
-    climbing = abs(goal_z - z)
-    same_air = max(across / speeds.air, climbing / speeds.climb)
-    same_water = max(across / speeds.water, climbing / speeds.dive)
     # changing medium: lateral flight and climbing in air overlap, then the crossing, then the leg in water
-    air_height = z if from_air else goal_z
-    water_height = goal_z if from_air else z
-    in_air = max(across / speeds.air, max(air_height - GATE, 0.0) / speeds.climb)
-    in_water = max(-GATE - water_height, 0.0) / speeds.dive
-    inside = min(air_height, GATE) - max(water_height, -GATE)
-    changing = in_air + in_water + inside * (1.0 / speeds.zone + SETTLE_SHARE)
-    same = same_air if from_air else same_water
-    return same if from_air == to_air else changing
+    climb, dive, inside = heights_of(z, goal_z, speeds)
+    changing = max(across / speeds.air, climb) + dive + inside * (1.0 / speeds.zone + SETTLE_SHARE)
+    return same_medium(across, z, goal_z, speeds) if is_air(z) == is_air(goal_z) else changing

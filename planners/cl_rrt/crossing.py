@@ -139,7 +139,6 @@ def _through(p, source, size, column, onward):
         clear = is_air(z) != down and abs(z) > zone + _CLEAR_OF_ZONE
         kind = OPEN if clear or ended == ARRIVED else CROSSING
         adopt(p, current, size, kind, ended, flown)
-        p.nodes[size].next = -1 if kind == OPEN else size + 1
         current = size
         size += 1
         if kind == OPEN:
@@ -205,12 +204,10 @@ def _settle(p, source, size, brake, onward, limit):
         ended, flown, _ = zone_edge(p, current, size, brake, p.margin)
         if ended == BLOCKED or flown.crossings > 0.0:
             break
-        adopt(p, current, size, SETTLING, ended, flown)
-        p.nodes[size].next = size + 1
+        adopt(p, current, size, OPEN if ended == ARRIVED else SETTLING, ended, flown)
         current = size
         size += 1
         if ended == ARRIVED:
-            p.nodes[current].kind = OPEN
             return size
         grown = _enter(p, current, size, column, onward)
         if grown > size:
@@ -221,14 +218,14 @@ def _settle(p, source, size, brake, onward, limit):
 @routine
 def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
-    s = node_state(p, source)
+    s, down = node_state(p, source), is_air(node_state(p, source).z)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1], is_air(s.z)) or (is_air(s.z) and near_wall(p, column[0], column[1])):
+    if not column_is_free(p, column[0], column[1], down) or (down and near_wall(p, column[0], column[1])):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)
     onward = _onward(p, column, sample)
-    if not is_air(s.z):  # swim on while rising
+    if not down:  # swim on while rising
         x, y, _, psi = water_reference(p, pointer(p.nodes[source]), onward)
         grown = _settle(p, source, size, (x, y, -_RISING, psi), onward, p.check.period)
         if grown > size:
@@ -236,7 +233,7 @@ def cross(p, source, size, sample):
     grown = _enter(p, source, size, column, onward)
     if grown > size:
         return grown
-    if is_air(s.z):
+    if down:
         old = view(pointer(p.nodes[source]), REFERENCE, Pose)
         for height in _BRAKE_HEIGHTS:
             for share in _BRAKE_SHARES:

@@ -7,7 +7,7 @@ from hydrone_gym._memory import pointer
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import propagate, propagate_watched
 from planners.cl_rrt.objective import cost_to_go
-from planners.cl_rrt.tree import node_state
+from planners.cl_rrt.tree import OPEN, node_state
 from planners.stop_check import keeps_room, single
 
 # How an edge ended
@@ -66,10 +66,13 @@ def zone_edge(p, source, slot, reference, margin):
 
 @inlined
 def adopt(p, parent, slot, kind, ended, flown):
-    """Make the end of an edge, in `slot`, a node of the tree; `ended` and `flown` are what `edge` returned."""
+    """Make the end of an edge, in `slot`, a node of the tree; `ended` and `flown` are what `edge` returned.
+
+    Inside a crossing the next slot follows it.
+    """
     node, before = p.nodes[slot], p.nodes[parent]
     s, a = node_state(p, slot), node_state(p, parent)
-    node.parent, node.next, node.kind = parent, -1, kind
+    node.parent, node.next, node.kind = parent, -1 if kind == OPEN else slot + 1, kind
     node.dead, node.unsafe, node.tried = 0, 0, 0
     node.goal = 1 if ended == ARRIVED else 0
     dx, dy, dz = s.x - a.x, s.y - a.y, s.z - a.z

@@ -14,7 +14,14 @@ from hydrone_gym._jit import inlined
 from hydrone_gym.control.envelope import Envelope
 from hydrone_gym.control.laws import envelope_of
 from hydrone_gym.simulation.simulation import Simulation
-from hydrone_gym.simulation.time_to_go import GATE, SETTLE_SHARE, CruiseSpeeds, cruise_speeds, time_to_go
+from hydrone_gym.simulation.time_to_go import (
+    SETTLE_SHARE,
+    CruiseSpeeds,
+    cruise_speeds,
+    heights_of,
+    same_medium,
+    time_to_go,
+)
 from hydrone_gym.surface import is_air
 from planners.cl_rrt.swimming import Pace, cheapest
 
@@ -102,12 +109,11 @@ def flown_part(across, climb, dive, rates):
 @inlined
 def crossing_point(x, y, z, goal_x, goal_y, goal_z, rates):
     """Return where (x, y in m) to cross on the straight way to a goal in the other medium."""
-    dx, dy, from_air = goal_x - x, goal_y - y, is_air(z)
+    dx, dy = goal_x - x, goal_y - y
     across = np.sqrt(dx * dx + dy * dy)
-    climb = max((z if from_air else goal_z) - GATE, 0.0) / rates.climb
-    dive = max(-GATE - (goal_z if from_air else z), 0.0) / rates.dive
+    climb, dive, _ = heights_of(z, goal_z, rates)
     flown = flown_part(across, climb, dive, rates)
-    share = (flown if from_air else across - flown) / max(across, 1e-9)
+    share = (flown if is_air(z) else across - flown) / max(across, 1e-9)
     return x + share * dx, y + share * dy
 
 
@@ -116,19 +122,10 @@ def least_to_go(x, y, z, goal_x, goal_y, goal_z, rates):
     """Return the cost from a position to the goal (m), obstacles not considered, crossing where that costs least."""
     dx, dy = goal_x - x, goal_y - y
     across = np.sqrt(dx * dx + dy * dy)
-    from_air, to_air = is_air(z), is_air(goal_z)
-    climbing = abs(goal_z - z)
-    same_air = max(across / rates.air, climbing / rates.climb)
-    same_water = max(across / rates.water, climbing / rates.dive)
-    air_height = z if from_air else goal_z
-    water_height = goal_z if from_air else z
-    climb = max(air_height - GATE, 0.0) / rates.climb
-    dive = max(-GATE - water_height, 0.0) / rates.dive
+    climb, dive, inside = heights_of(z, goal_z, rates)
     flown = flown_part(across, climb, dive, rates)
-    inside = min(air_height, GATE) - max(water_height, -GATE)
     changing = max(flown / rates.air, climb) + max((across - flown) / rates.water, dive) + inside / rates.zone
-    same = same_air if from_air else same_water
-    return same if from_air == to_air else changing
+    return same_medium(across, z, goal_z, rates) if is_air(z) == is_air(goal_z) else changing
 
 
 @inlined

@@ -46,12 +46,10 @@ def _settle(p, source, size, column):
         ended, flown = edge(p, current, size, column, p.margin)
         if ended == BLOCKED or flown.crossings > 0.0:
             break
-        adopt(p, current, size, SETTLING, ended, flown)
-        p.nodes[size].next = size + 1
+        adopt(p, current, size, OPEN if ended == ARRIVED else SETTLING, ended, flown)
         current = size
         size += 1
         if ended == ARRIVED:
-            p.nodes[current].kind = OPEN
             return current, size
     return -1, size
 
@@ -76,7 +74,6 @@ def cross_as_printed(p, source, size, column):
         through = is_air(z) != down and abs(z) > w.zone + _CLEAR_OF_ZONE
         kind = OPEN if through or ended == ARRIVED else CROSSING
         adopt(p, current, size, kind, ended, flown)
-        p.nodes[size].next = -1 if kind == OPEN else size + 1
         current = size
         size += 1
         if kind == OPEN:
