@@ -242,7 +242,7 @@ def _envelope_of(vehicle: Vehicle) -> Envelope:
         surge=surge,
         dive=gains.dive_limit,
         zone=gains.rise_limit,
-        stop_time=0.37,  # 1.09 m from 3 m/s, less from lower speeds: benchmarks/stop_distances.py
+        stop_time=0.37,  # a little more than it takes, 0.94 m from 2.8 m/s: benchmarks/stop_distances.py
         ahead_air=0.15,
         ahead_water=0.1,
         hold_radius=gains.hold_radius,
