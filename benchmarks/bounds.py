@@ -17,7 +17,7 @@ import tyro
 from joblib import Parallel, delayed
 
 import hydrone_gym  # noqa: F401  (registers the ids)
-from hydrone_gym.evaluation.bounds import Bound, BoundFlight, bounds_path, save_bounds
+from hydrone_gym.evaluation.bounds import GRID, Bound, BoundFlight, bounds_path, save_bounds
 from hydrone_gym.evaluation.suites import Mission, load_suite
 from hydrone_gym.world.scenario import Scenario
 from planners.belief import belief_of
@@ -50,7 +50,7 @@ def bound_of(mission: Mission, scenario: Scenario, a: Arguments) -> Bound:
     if env.unwrapped.options.weathered:  # type: ignore[attr-defined]
         raise ValueError(f"mission {mission.name} must be in still weather to be searched")
     place = Place(scenario.start, np.array(scenario.goal), scenario.obstacles)
-    return Bound(*map(_flight, fastest_flights(belief_of(env), place, effort=a.effort)))
+    return Bound(*map(_flight, fastest_flights(belief_of(env), place, grid=GRID, effort=a.effort)))
 
 
 def _flight(found: Found | None) -> BoundFlight | None:

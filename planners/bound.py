@@ -25,7 +25,6 @@ from planners.belief import Belief
 from planners.cl_rrt.policy import CLRRT
 from planners.policy import Known
 
-GRID = 256.0  # references are multiples of 1/256 m and rad: exact in single precision, and small to store
 EVERYWHERE = 100.0  # m: a range of sensing that leaves nothing unknown
 _STARTS = 8  # flights of the CL-RRT, a seed each
 _LONGEST = 60.0  # s that one of them may take
@@ -62,7 +61,7 @@ class Found(NamedTuple):
 
 
 def fastest_flights(
-    belief: Belief, place: Place, *, effort: int = 1, seed: int = 0
+    belief: Belief, place: Place, *, grid: float, effort: int = 1, seed: int = 0
 ) -> tuple[Found | None, Found | None]:
     """Search for the fastest flight that keeps the rule of the zone, and for the fastest of all.
 
@@ -72,6 +71,7 @@ def fastest_flights(
     Args:
         belief: vehicle, world, period and law, all of them true; still air and flat water.
         place: the world.
+        grid: references are multiples of 1 / `grid` m and rad; a power of two keeps them exact in single precision.
         effort: how often every round of the search is gone through; 1 flies 23,000 flights.
         seed: of the random stream and of the planner's first flight.
 
@@ -84,8 +84,8 @@ def fastest_flights(
     random = np.random.default_rng(seed)
     starts = [_planned(belief, place, seed + k) for k in range(_STARTS)]
     first, more = ([(best, effort * rounds) for best, rounds in stages] for stages in (_ROUNDS, _ROUNDS_MORE))
-    kept = _improved(_Trial(belief, place, belief.world.rough_speed), starts, first, random)
-    free = _Trial(belief, place, math.inf)
+    kept = _improved(_Trial(belief, place, grid, belief.world.rough_speed), starts, first, random)
+    free = _Trial(belief, place, grid, math.inf)
     return kept, _improved(free, starts if kept is None else [kept.references], more, random)
 
 
@@ -105,8 +105,8 @@ def _planned(belief: Belief, place: Place, seed: int) -> NDArray[np.float64]:
 class _Trial:
     """Flies plans in one world, `LANES` at a time; `zone_speed` is the greatest lateral speed in the zone, m/s."""
 
-    def __init__(self, belief: Belief, place: Place, zone_speed: float) -> None:
-        self.belief, self._place, self._zone_speed = belief, place, zone_speed
+    def __init__(self, belief: Belief, place: Place, grid: float, zone_speed: float) -> None:
+        self.belief, self._place, self._grid, self._zone_speed = belief, place, grid, zone_speed
         self._engine = belief.simulation(LANES).engine
         self._obstacles = np.repeat(place.obstacles.reshape(-1), LANES)[None]
         world = belief.world
@@ -114,7 +114,8 @@ class _Trial:
 
     def on_grid(self, plans: NDArray[np.float64]) -> NDArray[np.float64]:
         """Round plans to the grid, inside the box of references."""
-        return np.clip(np.round(GRID * plans), np.ceil(GRID * self._low), np.floor(GRID * self._high)) / GRID
+        n = self._grid
+        return np.clip(np.round(n * plans), np.ceil(n * self._low), np.floor(n * self._high)) / n
 
     def fly(self, plans: NDArray[np.float64]) -> tuple[NDArray[np.float64], np.ndarray]:
         """Fly plans (n, K, 4); return their times in s (n,), finer than a tick, and the rows (n,) they end as.

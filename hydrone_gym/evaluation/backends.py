@@ -112,10 +112,11 @@ def _ray(stack: contextlib.ExitStack, jobs: int | None) -> None:
 
     register_ray()
     if not ray.is_initialized():
-        # "local": a cluster that was killed leaves its address in a file, which Ray would connect to
-        local: dict[str, Any] = {"address": "local", "num_cpus": jobs, "include_dashboard": False}
-        local = {} if "RAY_ADDRESS" in os.environ else local
-        ray.init(logging_level=logging.ERROR, log_to_driver=False, **local)
+        options: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
+        if "RAY_ADDRESS" not in os.environ:
+            # "local": a cluster that was killed leaves its address in a file, which Ray would connect to
+            options |= {"address": "local", "num_cpus": jobs, "include_dashboard": False}
+        ray.init(**options)
         stack.callback(ray.shutdown)
 
 

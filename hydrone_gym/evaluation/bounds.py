@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym.evaluation.suites import FOLDER, load_suite
 
-GRID = 256.0  # references are stored as multiples of 1/256 m and rad
+GRID = 256.0  # references are multiples of 1/256 m and rad: exact in single precision, and small to store
 _FLIGHTS = ("kept", "free")  # names in a file: with the rule of the zone, and without
 
 

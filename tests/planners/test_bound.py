@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hydrone_gym.evaluation.bounds import GRID
 from hydrone_gym.simulation.outcome import GOAL
 from hydrone_gym.simulation.simulation import trajectory
 from hydrone_gym.vehicle import HYDRONE, HYDRONE_2021
@@ -30,7 +31,7 @@ def flown(found):
 
 
 def test_what_is_found_arrives_in_its_time_and_keeps_the_rule(few):
-    kept, free = fastest_flights(BELIEF, PLACE)
+    kept, free = fastest_flights(BELIEF, PLACE, grid=GRID)
     for found in (kept, free):
         times, states, _, row = flown(found)
         assert row["outcome"][0] == GOAL
@@ -40,12 +41,12 @@ def test_what_is_found_arrives_in_its_time_and_keeps_the_rule(few):
     states = flown(kept)[1]
     there = states[np.abs(states[:, 2]) <= 0.8]
     assert np.hypot(there[:, 6], there[:, 7]).max() <= 0.2
-    planned = bound._Trial(BELIEF, PLACE, np.inf).fly(bound._planned(BELIEF, PLACE, 0)[None])[0][0]
+    planned = bound._Trial(BELIEF, PLACE, GRID, np.inf).fly(bound._planned(BELIEF, PLACE, 0)[None])[0][0]
     assert free.time <= kept.time < planned
 
 
 def test_a_search_gives_the_same_again(few):
-    first, second = (fastest_flights(BELIEF, PLACE, seed=3) for _ in range(2))
+    first, second = (fastest_flights(BELIEF, PLACE, grid=GRID, seed=3) for _ in range(2))
     for one, other in zip(first, second, strict=True):
         assert one[1:] == other[1:]
         np.testing.assert_array_equal(one.references, other.references)
@@ -53,9 +54,9 @@ def test_a_search_gives_the_same_again(few):
 
 def test_where_nothing_arrives_nothing_is_found(few, monkeypatch):
     monkeypatch.setattr(bound, "_LONGEST", 1.0)  # s, too little for any flight
-    assert fastest_flights(BELIEF, PLACE) == (None, None)
+    assert fastest_flights(BELIEF, PLACE, grid=GRID) == (None, None)
 
 
 def test_a_vehicle_beyond_the_nominal_equations_is_refused():
     with pytest.raises(ValueError, match="vehicle 'hydrone-2021' has lag or height"):
-        fastest_flights(Belief(vehicle=HYDRONE_2021, world=World()), PLACE)
+        fastest_flights(Belief(vehicle=HYDRONE_2021, world=World()), PLACE, grid=GRID)
