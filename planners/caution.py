@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from hydrone_gym.weather.weather import LEVELS
 from planners.stop_check import MARGIN
 
-_TURN = 10.0  # s to leave the zone and turn against a current
+_TAKEN = 5.0  # s to be through the zone and get away from what a current pushes to
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
 
 
@@ -19,7 +19,7 @@ class Caution(NamedTuple):
     room: float  # from the walls, m; references 0.1 m more
     crossing_speed: float  # lateral limit of crossings that are planned, m/s; rough is 0.2
     crossing_tilt: float  # rad; rough is 5 degrees
-    drift: float  # m from the walls that a water entry keeps: what an unknown current carries a vehicle until it swims
+    drift: float  # m from the walls that crossings keep: as far as a current carries a vehicle until it swims
 
 
 def caution_at(level: Any) -> Caution:
@@ -33,7 +33,7 @@ def caution_at(level: Any) -> Caution:
         return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.0)
     share = level / _TUNED
     margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
-    return Caution(*margins, 0.15, math.radians(4.5), LEVELS[level].current * _TURN)
+    return Caution(*margins, 0.15, math.radians(4.5), LEVELS[level].current * _TAKEN)
 
 
 CALM = caution_at(0)

@@ -33,6 +33,7 @@ LOOK_AHEAD = 6.0  # s that a stop is simulated for: from 2 m/s in air it takes 4
 _RETREAT_AHEAD = 10.0  # s that a retreat is simulated for: a quarter turn takes five
 _RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
 _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
+_OBLIQUELY = ((2.3, 0.35), (2.3, -0.35), (-2.3, 0.35), (-2.3, -0.35))  # m ahead or astern, rad off the bow
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
 _DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
@@ -205,11 +206,33 @@ def rests(check, vessel, hover, seconds):
 
 
 @routine
+def _gets_away(check, vessel, seconds):
+    """Return (whether a vessel in a current gets away ahead or astern, the reference); the vessel stays as it is.
+
+    Who turns against a current first is carried along meanwhile; obliquely to it full thrust takes effect at once.
+    """
+    s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
+    away = single(s.x, s.y, s.z, s.psi)
+    for along, turn in _OBLIQUELY:
+        sine, cosine = sincos(s.psi + turn)
+        x, y, z = inside(check, s.x + along * cosine, s.y + along * sine, min(s.z, -WATER_GATE))
+        away = single(x, y, z, s.psi)
+        copy_vessel(vessel, spare)
+        if rests(check, spare, away, seconds):
+            return True, away
+    return False, away
+
+
+@routine
 def can_hover(check, vessel):
     """Return (whether a vessel can hover to rest on its side of the surface, the hover); the vessel stays as it is."""
     spare, hover = shifted(check.scratch, VESSEL), hover_reference(check, vessel)
     copy_vessel(vessel, spare)
-    return rests(check, spare, hover, LOOK_AHEAD), hover
+    if rests(check, spare, hover, LOOK_AHEAD):
+        return True, hover
+    if check.lane.weathered > 0 and not is_air(state_of(vessel).z):
+        return _gets_away(check, vessel, LOOK_AHEAD)
+    return False, hover
 
 
 @routine
@@ -243,16 +266,22 @@ def goes_on(check, vessel, held):
     """Return (HELD or RETREAT, the reference to go on with) for a vehicle that holds a reference.
 
     Under water a hover drifts, so what was safe when it was verified may no longer be; then the vehicle swims against
-    the drift, as nearly as is free. While it turns it may come nearer to spheres than the margin.
+    the drift, as nearly as is free, in a current also obliquely to it, ahead or astern, which needs no turn first.
+    While it turns it may come nearer to spheres than the margin. In weather who has begun to rise out of the water is
+    not called back: at the surface current and waves carry it along.
     """
     s, w, spare = state_of(vessel), check.world, shifted(check.scratch, VESSEL)
-    if is_air(s.z):
+    if is_air(s.z) or (check.lane.weathered > 0 and is_air(held[2])):
         return HELD, held
     copy_vessel(vessel, spare)
     if rests(check, spare, held, _RETREAT_AHEAD):
         return HELD, held
     lane, envelope, period = check.lane, check.envelope, check.period
     near = Check(lane, check.goal, check.eye, w, envelope, check.radius, LEAST_MARGIN, 0.0, period, check.scratch)
+    if check.lane.weathered > 0:
+        gets_away, away = _gets_away(near, vessel, _RETREAT_AHEAD)
+        if gets_away:
+            return RETREAT, away
     scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)
     for turn in _TURNS:
         sine, cosine = sincos(turn)

@@ -23,7 +23,6 @@ from planners.stop_check import AIR_GATE, WATER_GATE, inside
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate
 OF_DRIFT = 0.5  # share of it that spheres are kept at: they are smaller than walls
-_ROUNDING = 0.5  # m: a vehicle stops not quite where the column was drawn
 _CLEAR_OF_ZONE = 0.02  # m
 _BRAKE = 0.75  # s of braking after which another way to brake is tried
 _BRAKE_LEAD = 0.3  # s: where a reference that brakes leads the vehicle
@@ -53,6 +52,19 @@ def facing(x, y, to_x, to_y, psi):
 
 
 @inlined
+def heading_under(p, x, y, psi):
+    """Heading (rad) to enter the water with at a place: toward the goal.
+
+    In a current that is not known, on the line to the middle of the box: whichever wall it pushes to is left at once.
+    """
+    w, goal = p.check.world, p.check.goal
+    weathered = p.check.lane.weathered > 0
+    to_x = 0.5 * (w.x_min + w.x_max) if weathered else goal.x
+    to_y = 0.5 * (w.y_min + w.y_max) if weathered else goal.y
+    return facing(x, y, to_x, to_y, psi)
+
+
+@inlined
 def column_is_free(p, x, y, down):
     """Whether a vertical path through the zone clears every known obstacle, and a drift into the water most of it."""
     room = p.margin + (OF_DRIFT * p.settings.drift if down else 0.0)
@@ -61,21 +73,21 @@ def column_is_free(p, x, y, down):
 
 @inlined
 def near_wall(p, x, y):
-    """Whether a current that nobody knows could carry a vehicle from a column into a wall before it swims."""
-    w, away = p.check.world, p.settings.drift - _ROUNDING
+    """Whether a current could carry a vehicle from a column into a wall before it swims, or while it rises."""
+    w, away = p.check.world, p.settings.drift
     return x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away
 
 
 @inlined
 def column_from(p, s, sample):
     """Return the column (x, y, gate, psi) that a vehicle at the gate crosses in: where it stops, turned to go on."""
-    goal, down = p.check.goal, is_air(s.z)
+    down = is_air(s.z)
     ahead = p.check.envelope.stop_time if down else _AHEAD
     x, y, _ = inside(p.check, s.x + ahead * s.vx, s.y + ahead * s.vy, s.z)
     psi = s.psi
     if down:
         psi = facing(x, y, sample.x, sample.y, psi)
-        psi = facing(x, y, goal.x, goal.y, psi) if psi == s.psi else psi
+        psi = heading_under(p, x, y, psi) if psi == s.psi or p.check.lane.weathered > 0 else psi
     return x, y, AIR_GATE if down else -WATER_GATE, psi
 
 
@@ -220,7 +232,7 @@ def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     s, down = node_state(p, source), is_air(node_state(p, source).z)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1], down) or (down and near_wall(p, column[0], column[1])):
+    if not column_is_free(p, column[0], column[1], down) or near_wall(p, column[0], column[1]):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)

@@ -168,7 +168,8 @@ def verify_stop(p, first):
     """Check that node `first` can be followed to rest in known free space; write the references to the backup.
 
     The stop is a hover on the side of the surface where the vehicle is; inside a crossing, where that is not safe, as
-    much of the crossing as it takes until a hover is.
+    much of the crossing as it takes until a hover is. In weather a crossing that has begun goes on wherever it can:
+    who turns back is carried about at the surface.
     Returns the number of references, 0 if the stop fails. With `settings.verify` off every edge passes and is its own
     stop.
     """
@@ -182,21 +183,21 @@ def verify_stop(p, first):
         return 1
     end = pointer(p.nodes[p.nodes.size - 1])
     copy_vessel(vessel, end)
-    node, count = first, 0
-    safe, hover = can_hover(p.check, end)
-    # in weather who is out of the water does not go back: there the vehicle is carried along
-    safe = safe and not (p.check.room > 0.0 and p.nodes[first].kind == CROSSING and is_air(p.check.goal.z))
+    stays, back = can_hover(p.check, end)
+    node, count, safe, hover = first, 0, stays and p.check.lane.weathered == 0, back
     while not safe and p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
-        if node < 0:  # what comes after it was pruned
-            return 0
+        if node < 0 or count >= BACKUP - 1:  # what comes after it was pruned
+            break
         reference = reference_of(pointer(p.nodes[node]))
         on, _, _ = follow(p.check, end, end, reference)
-        if not on or count >= BACKUP - 1:
-            return 0
+        if not on:
+            break
         back_up(p, count, reference)
         count += 1
         safe, hover = can_hover(p.check, end)
+    if not safe and stays:
+        count, safe, hover = 0, True, back
     back_up(p, count, hover)
     return count + 1 if safe else 0
 

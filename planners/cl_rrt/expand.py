@@ -34,6 +34,7 @@ _OPTIMISM = 0.7  # the cost-to-go allows for turns and stops; this share of it b
 _MEASURED = 0.97  # the same where joules count: that cost-to-go allows for nothing
 _MEETING_SHARE = 0.5  # of the columns
 _WALL = 0.5  # m: samples keep this far from the walls
+_ASTRAY = 0.3  # m: a vehicle stops not quite where a column was drawn
 
 
 class Sample(NamedTuple):
@@ -105,7 +106,7 @@ def draw_column(p, draws, k, roam):
     else:
         sine, cosine = sincos(angle)
         radius = p.settings.column_radius * (share - _MEETING_SHARE) / (1.0 - _MEETING_SHARE)
-    wall = max(_WALL, p.settings.drift) if from_air else _WALL
+    wall = max(_WALL, p.settings.drift + _ASTRAY) if p.settings.drift > 0.0 else _WALL
     x = min(max(cx + radius * cosine, w.x_min + wall), w.x_max - wall)
     y = min(max(cy + radius * sine, w.y_min + wall), w.y_max - wall)
     return x, y, -_ROAM_HEIGHT if from_air else _ROAM_HEIGHT

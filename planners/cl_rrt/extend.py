@@ -6,7 +6,7 @@ from hydrone_gym._jit import inlined, routine
 from hydrone_gym._memory import pointer, view
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
-from planners.cl_rrt.crossing import column_is_free, cross, facing
+from planners.cl_rrt.crossing import column_is_free, cross, heading_under
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge, zone_edge
 from planners.cl_rrt.objective import crossing_point
 from planners.cl_rrt.references import air_reference, water_reference
@@ -66,7 +66,7 @@ def next_reference(p, i, aim, step):
         return water_reference(p, vessel, aim)
     psi = view(vessel, REFERENCE, Pose).psi
     # a vehicle on its way to the water turns in the air, where it is free to
-    psi = psi if is_air(goal.z) else facing(aim.x, aim.y, goal.x, goal.y, psi)
+    psi = psi if is_air(goal.z) else heading_under(p, aim.x, aim.y, psi)
     return air_reference(p, vessel, aim, psi, step)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym._memory import packed
 from planners.belief import Belief
-from planners.caution import Caution, caution_at
+from planners.caution import caution_at
 from planners.cl_rrt.execute import Constants, Query, cycle
 from planners.cl_rrt.expand import ANY_MEDIUM, CAREFUL, DRAWS, EDGE_TIME, STRAIGHT_ON
 from planners.cl_rrt.memory import Memory, Report, first_memory
@@ -24,7 +24,8 @@ from planners.policy import Known, Observation, PlannerPolicy, known, whole_numb
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
-_PATIENCE = 30.0  # s of a flight after which a water entry keeps no more from walls than all else does
+_PATIENCE = 15.0  # s of a flight after which a crossing keeps half as far from walls, for what a current may do
+_BOLDER = (1.0, 0.5, 0.25)  # of that distance, one after another
 _CAREFUL_AFTER, _ANY_MEDIUM_AFTER = 2, 8  # half seconds without a path before samples are sought further afield
 
 
@@ -84,13 +85,14 @@ class CLRRT(PlannerPolicy):
         calm = self.belief.simulation()
         costs = objective_params(calm, objective)
         self.cruise_speed = safe_speed(calm, 2 if latency else 1)
-        bold = self.caution._replace(drift=0.0)
-        self._constants, self._late = (
-            Constants(packed(envelope), self._packed_settings(caution, objective != "paper"), packed(costs))
-            for caution in (self.caution, bold)
+        self._constants = tuple(
+            Constants(packed(envelope), self._packed_settings(share, objective != "paper"), packed(costs))
+            for share in _BOLDER
         )
 
-    def _packed_settings(self, caution: Caution, prune: bool) -> NDArray[np.float64]:
+    def _packed_settings(self, share: float, prune: bool) -> NDArray[np.float64]:
+        """Pack the settings, with a share of the distance that crossings keep from walls."""
+        caution = self.caution._replace(drift=share * self.caution.drift)
         return packed(self.settings.params(self.cruise_speed * self.belief.period, caution, prune=prune))
 
     def act(self, now: Known, memory: Memory | None) -> tuple[NDArray[np.float64], Memory]:
@@ -160,8 +162,8 @@ class CLRRT(PlannerPolicy):
                 begin=begin,
                 finish=done,
             )
-            late = memory.cycle * self.belief.period > _PATIENCE
-            size, first, stop, end = cycle(work, query, self._late if late else self._constants)
+            bolder = min(int(memory.cycle * self.belief.period / _PATIENCE), len(_BOLDER) - 1)
+            size, first, stop, end = cycle(work, query, self._constants[bolder])
             begin = False
         return size, first, stop, end
 
@@ -193,6 +195,6 @@ class CLRRT(PlannerPolicy):
         whole = copy.copy(self)
         whole.iterations, whole.time_budget = whole_number("iterations", iterations, 1), None
         # a picture of the tree wants its other branches too
-        whole._constants = self._constants._replace(settings=self._packed_settings(self.caution, False))
+        whole._constants = (self._constants[0]._replace(settings=self._packed_settings(1.0, False)),) * len(_BOLDER)
         size = whole._run(work, start, start.state[:3], memory, 0.0)[0]
         return tree_view(work.nodes[:size])
