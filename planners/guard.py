@@ -16,13 +16,14 @@ from hydrone_gym.world.bodies import BODY, segment_distance
 from planners.stop_check import (
     HELD,
     Check,
+    clearance_left,
     goes_on,
     inside,
-    margin_left,
-    room_left,
+    place_of,
     single,
     state_of,
     verify,
+    wall_near,
 )
 
 _NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
@@ -37,6 +38,8 @@ class GuardQuery(NamedTuple):
     conditions: NDArray[np.float64]  # (n, CONDITIONS) what each is believed to fly in; (n, 0) without weather
     margin: float  # clearance to keep, m
     room: float  # distance to keep from the walls, m
+    tube: NDArray[np.float64]  # (3, TUBE_LENGTH) m, by place of the look and time since
+    since: float  # s from the look to where the references begin
     spheres: NDArray[np.float64]  # (n, 4 M) known ones, unused ones `NOWHERE`
     sent: NDArray[np.float64]  # (n, 4) references to fly, written
     held: NDArray[np.float64]  # (n, 4) hovers verified last, updated
@@ -103,10 +106,11 @@ def guard(query, rollout, envelope, candidates, scratch):
         row = query.rows[n]
         vessel, s = pointer(row), state_of(pointer(row))
         lane = of_row(whole, _keep_near(query.spheres[n], s, whole.obstacles), pointer(query.conditions[n]))
-        margin = margin_left(query.margin, vessel, lane, radius)
-        room = room_left(query.room, vessel, world)
+        margins = query.margin, clearance_left(vessel, lane, radius), query.room, wall_near(vessel, world)
+        tube = pointer(query.tube[place_of(s.z)])
         goal, eye = view(row.goal, 0, Point), view(query.eyes[n], 0, Point)
-        check = Check(lane, goal, eye, world, limits, radius, margin, room, period, pointer(scratch))
+        around = (lane, goal, eye, world, limits, radius)
+        check = Check(*around, *margins, tube, query.since, period, pointer(scratch))
         query.choice[n], reference, hover = _first_safe(check, vessel, query.proposed[n], candidates)
         if query.choice[n] == HELD:
             query.choice[n], reference = goes_on(check, vessel, _four(query.held[n]))

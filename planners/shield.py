@@ -34,6 +34,7 @@ from planners.disturbance import Estimator, Sight
 from planners.guard import GuardQuery, guard
 from planners.policy import KEYS, Known, known
 from planners.stop_check import AIR_GATE, HELD, RETREAT, WATER_GATE
+from planners.tube import tube_at
 
 __all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
 
@@ -87,13 +88,22 @@ class Shield:
         ValueError: no level, a latency that is not True or False.
     """
 
-    def __init__(self, policy: Any, belief: Belief | Any, *, level: int = 0, latency: bool = False) -> None:
+    def __init__(
+        self,
+        policy: Any,
+        belief: Belief | Any,
+        *,
+        level: int = 0,
+        promise: float | None = None,
+        latency: bool = False,
+    ) -> None:
         """Make the working storage."""
         self.policy = policy
         self.belief = Belief.of(belief)
         if not isinstance(latency, bool):
             raise ValueError(f"latency must be True or False, got {latency!r}")
         self.caution, self.latency = caution_at(level), latency
+        self._tube = tube_at(self.belief, level, promise)
         self.estimator = Estimator(self.belief, weathered=level > 0)
         self.simulation = self.estimator.simulation
         self._envelope, self._scratch = packed(self.belief.envelope), np.zeros(2 * VESSEL)
@@ -109,6 +119,7 @@ class Shield:
         *,
         belief: Belief | Literal["truth"] | None = None,
         level: int = 0,
+        promise: float | None = None,
         latency: bool = False,
     ) -> Self:
         """Shield a policy for a HyDrone environment or a vector of them.
@@ -116,7 +127,7 @@ class Shield:
         `belief` is what to check with instead of the nominal model, see `planners.belief.belief_of`; the rest is the
         class's. Raises TypeError for any other environment.
         """
-        return cls(policy, belief_of(env, belief), level=level, latency=latency)
+        return cls(policy, belief_of(env, belief), level=level, promise=promise, latency=latency)
 
     def predict(
         self,
@@ -217,6 +228,8 @@ class Shield:
             conditions=np.array(conditions),
             margin=self.caution.margin,
             room=self.caution.room,
+            tube=self._tube,
+            since=self.belief.period if self.latency else 0.0,
             proposed=np.ascontiguousarray(np.minimum(np.maximum(proposed, self._low), self._high)),
             spheres=spheres.reshape(count, -1),
             sent=np.empty((count, 4)),

@@ -39,6 +39,9 @@ _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment onl
 _DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
 _CARRIED = 2.0  # s: the same in a current, which moves on what has been looked at for as long as a stop is
 _WALL = 0.1  # m: references keep this far inside the box
+_NEARER = 0.5  # share of its distance from the walls that a vehicle near one may use up
+TUBE_STEP = 0.5  # s
+TUBE_LENGTH = 14  # steps: a period, the stop after it, and latency
 
 
 class Check(NamedTuple):
@@ -50,8 +53,12 @@ class Check(NamedTuple):
     world: Any  # view of a `WorldParams`
     envelope: Any  # view of an `Envelope`
     radius: float  # of the vehicle, m
-    margin: float  # clearance to keep, m
+    margin: float  # clearance to keep, m, of a vehicle that is where it is believed to be
+    near: float  # clearance it has now, m, less `GIVE`: who is nearer than the margin keeps that
     room: float  # m that a vehicle keeps from the walls, and its references more by `_WALL`
+    wall: float  # m that it may come near to the walls, whatever it should keep
+    tube: Any  # pointer to how far it may be from where it is believed to be, m, every `TUBE_STEP` after the look
+    since: float  # s since that look
     period: float  # s
     scratch: Any  # pointer to room for two vessels
 
@@ -68,22 +75,43 @@ def inside(check, x, y, z):
 
 
 @inlined
-def _within(w, s, room):
-    """Whether a place keeps its distance from the walls; with none to keep, that is for the outcome to say."""
-    across = s.x - w.x_min >= room and w.x_max - s.x >= room and s.y - w.y_min >= room and w.y_max - s.y >= room
-    return room == 0.0 or (across and s.z - w.z_min >= room and w.z_max - s.z >= room)
+def place_of(z):
+    """Return where a look is from, by height (m): 0 in air, 1 near the surface, 2 in water."""
+    return 1 if -WATER_GATE < z < AIR_GATE else 0 if is_air(z) else 2
 
 
 @inlined
-def keeps_room(check, vessel):
-    """Whether a vehicle keeps its distance from the walls."""
-    return _within(check.world, state_of(vessel), check.room)
+def astray(check, seconds):
+    """How far (m) a vehicle may be from where it is believed to be, some time after it began to fly."""
+    k = int(np.ceil((check.since + seconds) / TUBE_STEP - 1e-9)) - 1
+    return check.tube[max(0, min(k, TUBE_LENGTH - 1))]
 
 
 @inlined
-def room_left(wanted, vessel, world):
-    """The distance to keep from the walls (m): the wanted one, or none for a vehicle that is already nearer."""
-    return wanted if _within(world, state_of(vessel), wanted) else 0.0
+def margin_after(check, seconds):
+    """The clearance (m) to keep some time after a vehicle began to fly."""
+    return max(min(check.margin + astray(check, seconds), check.near), LEAST_MARGIN)
+
+
+@inlined
+def _from_walls(w, s):
+    """Distance (m) of a place from the nearest wall."""
+    across = min(min(s.x - w.x_min, w.x_max - s.x), min(s.y - w.y_min, w.y_max - s.y))
+    return min(across, min(s.z - w.z_min, w.z_max - s.z))
+
+
+@inlined
+def keeps_room(check, vessel, seconds):
+    """Whether a vehicle keeps its distance from the walls; in still weather that is for the outcome to say."""
+    if check.lane.weathered == 0:
+        return True
+    return _from_walls(check.world, state_of(vessel)) >= min(check.room + astray(check, seconds), check.wall)
+
+
+@inlined
+def wall_near(vessel, world):
+    """How near to the walls (m) a vehicle may come, whatever it should keep: who is near must be free to move."""
+    return _NEARER * _from_walls(world, state_of(vessel))
 
 
 @inlined
@@ -118,14 +146,14 @@ def copy_vessel(source, target):
 
 
 @inlined
-def margin_left(wanted, vessel, lane, radius):
-    """The margin (m) to keep now: the wanted one, or what a vehicle already nearer to an obstacle has left.
+def clearance_left(vessel, lane, radius):
+    """Clearance (m) that a vehicle has now, less `GIVE`.
 
-    Without this a vehicle that drifted or stopped within the margin could never move again.
+    Who is nearer to an obstacle than the margin keeps this instead: a vehicle that drifted or stopped within the margin
+    could never move again.
     """
     p = state_of(vessel)
-    left = clearance_between((p.x, p.y, p.z), (p.x, p.y, p.z), lane, 0, radius) - GIVE
-    return max(min(wanted, left), LEAST_MARGIN)
+    return clearance_between((p.x, p.y, p.z), (p.x, p.y, p.z), lane, 0, radius) - GIVE
 
 
 @inlined
@@ -151,13 +179,18 @@ def hover_reference(check, vessel):
 
 
 @routine
-def follow(check, start, end, reference):
-    """Fly a vessel toward a reference for one period; return (whether that is safe, arrives, passes the surface)."""
+def follow(check, start, end, reference, seconds):
+    """Fly a vessel toward a reference for one period, some time after it began to fly.
+
+    Returns (whether that is safe, arrives, passes the surface).
+    """
     flown = propagate(check.lane, start, end, check.goal, reference)
     smooth = flown.lateral_speed <= check.world.rough_speed and flown.cos_tilt >= check.world.rough_cos_tilt
     arrives = flown.outcome == GOAL
     on = flown.outcome == RUNNING or arrives
-    safe = on and flown.clearance >= check.margin and smooth and keeps_room(check, end) and sensed(check, end)
+    seconds += check.period
+    apart = flown.clearance >= margin_after(check, seconds) and keeps_room(check, end, seconds)
+    safe = on and apart and smooth and sensed(check, end)
     return safe, arrives, flown.crossings > 0.0
 
 
@@ -180,8 +213,10 @@ def _resting(check, s, hover, was_slow):
 
 
 @routine
-def rests(check, vessel, hover, seconds):
+def rests(check, vessel, hover, seconds, after):
     """Whether a vessel comes to rest safely at a hover within some time; it is flown in place.
+
+    `after` is how long it has been flying (s).
 
     It passes the surface only if the hover lies on the other side. In a current nothing rests under water: there it is
     enough that the vehicle is safe all that time and, carried on, for a while after.
@@ -189,7 +224,8 @@ def rests(check, vessel, hover, seconds):
     resting, stays = False, is_air(state_of(vessel).z) == is_air(hover[2])
     for _ in range(int(np.ceil(seconds / check.period))):
         was_slow = _slow(state_of(vessel))
-        safe, arrives, crosses = follow(check, vessel, vessel, hover)
+        safe, arrives, crosses = follow(check, vessel, vessel, hover, after)
+        after += check.period
         if arrives or not safe or (crosses and stays):
             return safe and not (crosses and stays)
         resting = _resting(check, state_of(vessel), hover, was_slow)
@@ -202,11 +238,12 @@ def rests(check, vessel, hover, seconds):
     x, y = s.x + drift * s.vx, s.y + drift * s.vy
     if not (w.x_min < x < w.x_max and w.y_min < y < w.y_max):
         return False
-    return clearance_between((s.x, s.y, s.z), (x, y, s.z), check.lane, 0, check.radius) >= check.margin
+    near = clearance_between((s.x, s.y, s.z), (x, y, s.z), check.lane, 0, check.radius)
+    return near >= margin_after(check, after)
 
 
 @routine
-def _gets_away(check, vessel, seconds):
+def _gets_away(check, vessel, seconds, after):
     """Return (whether a vessel in a current gets away ahead or astern, the reference); the vessel stays as it is.
 
     Who turns against a current first is carried along meanwhile; obliquely to it full thrust takes effect at once.
@@ -218,47 +255,56 @@ def _gets_away(check, vessel, seconds):
         x, y, z = inside(check, s.x + along * cosine, s.y + along * sine, min(s.z, -WATER_GATE))
         away = single(x, y, z, s.psi)
         copy_vessel(vessel, spare)
-        if rests(check, spare, away, seconds):
+        if rests(check, spare, away, seconds, after):
             return True, away
     return False, away
 
 
 @routine
-def can_hover(check, vessel):
+def can_hover(check, vessel, after):
     """Return (whether a vessel can hover to rest on its side of the surface, the hover); the vessel stays as it is."""
     spare, hover = shifted(check.scratch, VESSEL), hover_reference(check, vessel)
     copy_vessel(vessel, spare)
-    if rests(check, spare, hover, LOOK_AHEAD):
+    if rests(check, spare, hover, LOOK_AHEAD, after):
         return True, hover
     if check.lane.weathered > 0 and not is_air(state_of(vessel).z):
-        return _gets_away(check, vessel, LOOK_AHEAD)
+        return _gets_away(check, vessel, LOOK_AHEAD, after)
     return False, hover
 
 
 @routine
-def can_stop(check, vessel):
+def can_stop(check, vessel, after):
     """Return (whether a vessel can come to rest, the hover that does it); the vessel is left as it is.
 
     Near the surface there are two ways to stop: go back to the side one is on, or finish the crossing. The second one
     is for those who have no plan of crossings: a planner that counted on it would enter the zone anywhere.
     """
     spare = shifted(check.scratch, VESSEL)
-    stops, hover = can_hover(check, vessel)
+    stops, hover = can_hover(check, vessel, after)
     if stops or abs(state_of(vessel).z) > AIR_GATE:
         return stops, hover
     hover = single(hover[0], hover[1], -WATER_GATE if is_air(hover[2]) else AIR_GATE, hover[3])
     copy_vessel(vessel, spare)
-    return rests(check, spare, hover, LOOK_AHEAD), hover
+    return rests(check, spare, hover, LOOK_AHEAD, after), hover
 
 
 @routine
 def verify(check, vessel, reference):
     """Return (whether a reference can be followed to rest, the hover that does it); the vessel is left as it is."""
     end = check.scratch
-    safe, arrives, _ = follow(check, vessel, end, reference)
+    safe, arrives, _ = follow(check, vessel, end, reference, 0.0)
     if arrives or not safe:
         return safe, hover_reference(check, end)
-    return can_stop(check, end)
+    return can_stop(check, end, check.period)
+
+
+@inlined
+def _careless(check):
+    """The same check, but for margins: nothing may be touched."""
+    c, tight = check, LEAST_MARGIN
+    return Check(
+        c.lane, c.goal, c.eye, c.world, c.envelope, c.radius, tight, tight, 0.0, 0.0, c.tube, c.since, c.period, c.scratch
+    )
 
 
 @routine
@@ -270,16 +316,15 @@ def goes_on(check, vessel, held):
     While it turns it may come nearer to spheres than the margin. In weather who has begun to rise out of the water is
     not called back: at the surface current and waves carry it along.
     """
-    s, w, spare = state_of(vessel), check.world, shifted(check.scratch, VESSEL)
+    s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
     if is_air(s.z) or (check.lane.weathered > 0 and is_air(held[2])):
         return HELD, held
     copy_vessel(vessel, spare)
-    if rests(check, spare, held, _RETREAT_AHEAD):
+    if rests(check, spare, held, _RETREAT_AHEAD, 0.0):
         return HELD, held
-    lane, envelope, period = check.lane, check.envelope, check.period
-    near = Check(lane, check.goal, check.eye, w, envelope, check.radius, LEAST_MARGIN, 0.0, period, check.scratch)
+    near = _careless(check)
     if check.lane.weathered > 0:
-        gets_away, away = _gets_away(near, vessel, _RETREAT_AHEAD)
+        gets_away, away = _gets_away(near, vessel, _RETREAT_AHEAD, 0.0)
         if gets_away:
             return RETREAT, away
     scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)
@@ -289,7 +334,7 @@ def goes_on(check, vessel, held):
         x, y, z = inside(check, x, y, min(s.z, -WATER_GATE))
         back = single(x, y, z, s.psi)
         copy_vessel(vessel, spare)
-        if rests(near, spare, back, _RETREAT_AHEAD):
+        if rests(near, spare, back, _RETREAT_AHEAD, 0.0):
             return RETREAT, back
     return HELD, held
 

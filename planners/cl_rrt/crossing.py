@@ -72,9 +72,9 @@ def column_is_free(p, x, y, down):
 
 
 @inlined
-def near_wall(p, x, y):
+def near_wall(p, x, y, share):
     """Whether a current could carry a vehicle from a column into a wall before it swims, or while it rises."""
-    w, away = p.check.world, p.settings.drift
+    w, away = p.check.world, share * p.settings.drift
     return x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away
 
 
@@ -232,7 +232,7 @@ def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     s, down = node_state(p, source), is_air(node_state(p, source).z)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1], down) or near_wall(p, column[0], column[1]):
+    if not column_is_free(p, column[0], column[1], down) or near_wall(p, column[0], column[1], 1.0):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)

@@ -24,7 +24,7 @@ def _judged(p, end, flown, margin):
     w, o, vertical = p.check.world, p.settings, p.check.world.vertical_mode > 0.0
     fast = flown.lateral_speed > (o.crossing_speed if vertical else SMOOTH * w.rough_speed)
     level = o.crossing_cos_tilt if vertical else 1.0 - SMOOTH * SMOOTH * (1.0 - w.rough_cos_tilt)
-    if flown.clearance < margin or fast or flown.cos_tilt < level or not keeps_room(p.check, end):
+    if flown.clearance < margin or fast or flown.cos_tilt < level or not keeps_room(p.check, end, 0.0):
         return BLOCKED
     if flown.outcome == GOAL:
         return ARRIVED

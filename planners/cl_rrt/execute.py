@@ -16,7 +16,7 @@ from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.surface import is_air
-from planners.cl_rrt.crossing import OF_DRIFT
+from planners.cl_rrt.crossing import OF_DRIFT, near_wall
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
@@ -24,29 +24,34 @@ from planners.cl_rrt.settings import SettingParams
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, ROOT, Planner, node_state, prune_orphans, reroot
 from planners.clearance import clearance_between
 from planners.stop_check import (
+    LEAST_MARGIN,
     Check,
     can_hover,
+    clearance_left,
     copy_vessel,
     follow,
     goes_on,
-    margin_left,
+    place_of,
     reference_of,
-    room_left,
     sensed,
+    state_of,
+    wall_near,
 )
 
 _BEND = 0.1  # m: how far an edge may leave its chord
+_CARRIED_TO = 0.85  # of the distance that crossings keep from walls is enough to begin one that was planned
 _AT_GOAL = 1e9  # any path that arrives is better than any that does not
 _DETOUR = 0.05  # share of the cost-to-come that tells apart branches that end equally near
 _FULL = 0.8  # share of the tree's capacity
 
 
 class Constants(NamedTuple):
-    """What a planner is made with: packed `Envelope`, `SettingParams` and `ObjectiveParams`."""
+    """What a planner is made with: packed `Envelope`, `SettingParams`, `ObjectiveParams`, and its tube."""
 
     envelope: NDArray[np.float64]
     settings: NDArray[np.float64]
     objective: NDArray[np.float64]
+    tube: NDArray[np.float64]  # (3, TUBE_LENGTH) m, by place of the look and time since
 
 
 class Query(NamedTuple):
@@ -58,6 +63,7 @@ class Query(NamedTuple):
     draws: NDArray[np.float64]  # uniform numbers for `expand_tree`
     size: int  # nodes in use
     root: int  # predicted node to root the tree at, -1 to begin a new tree
+    since: float  # s from the look to where the first edge begins
     known_before: int  # obstacles the tree was grown with
     held: NDArray[np.float64]  # (4,) reference of the backup that is next
     holds: bool  # whether that is its last, a hover, which may not be safe for ever
@@ -152,6 +158,10 @@ def re_propagate(p, end):
         ended, flown = edge(p, n.parent, i, reference_of(pointer(n)), 0.5 * p.margin)
         if ended == BLOCKED or (flown.crossings > 0.0 and not may_cross):
             return -i
+        if n.parent == ROOT and n.kind == CROSSING and p.nodes[ROOT].kind != CROSSING:
+            s = node_state(p, ROOT)
+            if near_wall(p, s.x, s.y, _CARRIED_TO):
+                return -i
         adopt(p, n.parent, i, n.kind, ended, flown)
         n.next, n.unsafe, n.tried = kept_next, kept_unsafe, kept_tried
     return p.path[depth - 1]
@@ -183,19 +193,21 @@ def verify_stop(p, first):
         return 1
     end = pointer(p.nodes[p.nodes.size - 1])
     copy_vessel(vessel, end)
-    stays, back = can_hover(p.check, end)
+    after = p.check.period
+    stays, back = can_hover(p.check, end, after)
     node, count, safe, hover = first, 0, stays and p.check.lane.weathered == 0, back
     while not safe and p.nodes[node].kind == CROSSING:
         node = p.nodes[node].next
         if node < 0 or count >= BACKUP - 1:  # what comes after it was pruned
             break
         reference = reference_of(pointer(p.nodes[node]))
-        on, _, _ = follow(p.check, end, end, reference)
+        on, _, _ = follow(p.check, end, end, reference, after)
         if not on:
             break
         back_up(p, count, reference)
         count += 1
-        safe, hover = can_hover(p.check, end)
+        after += p.check.period
+        safe, hover = can_hover(p.check, end, after)
     if not safe and stays:
         count, safe, hover = 0, True, back
     back_up(p, count, hover)
@@ -232,7 +244,7 @@ def planner_of(work, query, constants):
     world, radius = world_of(lane.values), vehicle_of(lane.values).radius
     settings = view(constants.settings, 0, SettingParams)
     vessel = pointer(query.start)
-    margin = margin_left(settings.margin, vessel, lane, radius)
+    left = clearance_left(vessel, lane, radius)
     check = Check(
         lane,
         view(query.goal, 0, Point),
@@ -240,12 +252,17 @@ def planner_of(work, query, constants):
         world,
         view(constants.envelope, 0, Envelope),
         radius,
-        min(margin, settings.rest_margin),
-        room_left(settings.room, vessel, world),
+        min(settings.margin, settings.rest_margin),
+        left,
+        settings.room,
+        wall_near(vessel, world),
+        pointer(constants.tube[place_of(state_of(vessel).z)]),
+        query.since,
         lane.ticks * TICK,
         pointer(work.scratch),
     )
     objective = view(constants.objective, 0, ObjectiveParams)
+    margin = max(min(settings.margin, left), LEAST_MARGIN)
     return Planner(work.nodes, work.path, work.backup, work.edges, check, settings, objective, margin)
 
 

@@ -21,6 +21,7 @@ from planners.cl_rrt.tree import BACKUP, Workspace
 from planners.cl_rrt.view import TreeView, tree_view
 from planners.disturbance import Estimator, Sight
 from planners.policy import Known, Observation, PlannerPolicy, known, whole_number
+from planners.tube import tube_at
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
@@ -62,6 +63,7 @@ class CLRRT(PlannerPolicy):
         time_budget: float | None = None,
         objective: str | float = "time",
         level: int = 0,
+        promise: float | None = None,
         latency: bool = False,
         seed: int = 0,
         settings: CLRRTSettings | None = None,
@@ -83,10 +85,10 @@ class CLRRT(PlannerPolicy):
         self.settings = margins if settings is None else settings
         envelope = self.belief.envelope
         calm = self.belief.simulation()
-        costs = objective_params(calm, objective)
+        costs, tube = objective_params(calm, objective), tube_at(self.belief, level, promise)
         self.cruise_speed = safe_speed(calm, 2 if latency else 1)
         self._constants = tuple(
-            Constants(packed(envelope), self._packed_settings(share, objective != "paper"), packed(costs))
+            Constants(packed(envelope), self._packed_settings(share, objective != "paper"), packed(costs), tube)
             for share in _BOLDER
         )
 
@@ -154,6 +156,7 @@ class CLRRT(PlannerPolicy):
                 draws=random.random(samples * DRAWS),
                 size=size,
                 root=root,
+                since=self.belief.period if self.latency else 0.0,
                 known_before=memory.known,
                 held=memory.backup[0],
                 holds=memory.stop == 1,
