@@ -3,8 +3,13 @@
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hydrone_gym.weather.weather import LEVELS
-from planners.stop_check import MARGIN
+from planners.belief import Belief
+from planners.check import MARGIN
+from planners.tube import NO_TUBE, tube_of
 
 _TAKEN = 5.0  # s to be through the zone and get away from what a current pushes to
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
@@ -20,6 +25,7 @@ class Caution(NamedTuple):
     crossing_speed: float  # lateral limit of crossings that are planned, m/s; rough is 0.2
     crossing_tilt: float  # rad; rough is 5 degrees
     drift: float  # m from the walls that crossings keep: as far as a current carries a vehicle until it swims
+    tube: NDArray[np.float64] = NO_TUBE  # (3, TUBE_LENGTH) m, what stops keep besides, by place and time of the look
 
 
 def caution_at(level: Any) -> Caution:
@@ -34,6 +40,19 @@ def caution_at(level: Any) -> Caution:
     share = level / _TUNED
     margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
     return Caution(*margins, 0.15, math.radians(4.5), LEVELS[level].current * _TAKEN)
+
+
+def caution_for(belief: Belief, level: Any, promise: float | None = None) -> Caution:
+    """Return what to keep at a level, with stops that keep the tube of a promise instead of margins that were tried.
+
+    Raises ValueError for what is no level, for a promise without one, and for one that no tube can tell.
+    """
+    caution = caution_at(level)
+    if promise is None:
+        return caution
+    if level == 0:
+        raise ValueError(f"promise needs a level of weather from 1 to {len(LEVELS) - 1} to be measured in, got level=0")
+    return caution._replace(margin=MARGIN, rest_margin=MARGIN, tube=tube_of(belief, level).at(promise))
 
 
 CALM = caution_at(0)

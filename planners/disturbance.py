@@ -25,7 +25,8 @@ _GAIN = 0.63  # share of a correction that is made in a period
 _STEP = np.array([1.0, 1.0, 0.5, 0.05, 0.05, 0.5])  # what the sensitivity is measured with
 _MOST_STEP = np.array([3.0, 3.0, 1.5, 0.15, 0.15, 1.5])  # the greatest correction
 _MOST = np.array([15.0, 15.0, 3.0, 1.0, 1.0, 3.0])  # bounds of the estimate
-_NOISE = 0.001  # m/s: a velocity that a period's disturbance of `_STEP` must change more than, to tell anything
+# m/s: a velocity that a period's disturbance of `_STEP` must change more than, to tell anything; waves heave
+_NOISE = np.array([0.001, 0.001, 0.001, 0.001, 0.001, 0.02])
 
 
 class Sight(NamedTuple):
@@ -86,7 +87,7 @@ class Estimator:
             step = np.where(np.arange(6) == k, _STEP, 0.0)
             further, back = (self._predicted(before, now, estimate + sign * step) for sign in (1.0, -1.0))
             sensitivity[:, k] = 0.5 * (self._moved(further) - self._moved(back))
-        damped = sensitivity.T @ sensitivity + _NOISE**2 * np.eye(6)
+        damped = sensitivity.T @ sensitivity + np.diag(_NOISE**2)
         wanted = np.linalg.solve(damped, sensitivity.T @ error) * _STEP
         return np.clip(estimate + _GAIN * np.clip(wanted, -_MOST_STEP, _MOST_STEP), -_MOST, _MOST)
 

@@ -13,18 +13,8 @@ from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of, of_row
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.world.bodies import BODY, segment_distance
-from planners.stop_check import (
-    HELD,
-    Check,
-    clearance_left,
-    goes_on,
-    inside,
-    place_of,
-    single,
-    state_of,
-    verify,
-    wall_near,
-)
+from planners.check import Check, clearance_left, inside, place_of, single, state_of, wall_near
+from planners.stop_check import HELD, goes_on, verify
 
 _NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import gaps_along
 from planners.belief import Belief
+from planners.check import AIR_GATE, WATER_GATE
 from planners.policy import Known, PlannerPolicy, whole_number
-from planners.stop_check import AIR_GATE, WATER_GATE
 
 _GOAL_BIAS = 0.2
 _COLUMN_BIAS = 0.3  # share of samples that are crossings, while the mission must change medium

@@ -11,13 +11,13 @@ from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.simulation import row_at
 from hydrone_gym.surface import in_air
 from planners.belief import Belief
+from planners.check import AIR_GATE, WATER_GATE
 from planners.cl_rrt.execute import Constants, Query, cycle
 from planners.cl_rrt.expand import DRAWS, STRAIGHT_ON
 from planners.cl_rrt.objective import objective_params
 from planners.cl_rrt.settings import CLRRTSettings
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, Workspace, new_nodes
 from planners.policy import Known, PlannerPolicy, whole_number
-from planners.stop_check import AIR_GATE, WATER_GATE
 
 _SPEED_SHARE = 0.95  # of the speed limit, at which references move in air
 _FULL = 0.75  # share of its capacity at which a tree starts anew

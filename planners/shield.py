@@ -29,12 +29,12 @@ from hydrone_gym.simulation.storage import VESSEL, new_rows
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import NOWHERE
 from planners.belief import Belief, belief_of
-from planners.caution import caution_at
+from planners.caution import caution_for
+from planners.check import AIR_GATE, WATER_GATE
 from planners.disturbance import Estimator, Sight
 from planners.guard import GuardQuery, guard
 from planners.policy import KEYS, Known, known
-from planners.stop_check import AIR_GATE, HELD, RETREAT, WATER_GATE
-from planners.tube import tube_at
+from planners.stop_check import HELD, RETREAT
 
 __all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
 
@@ -102,8 +102,7 @@ class Shield:
         self.belief = Belief.of(belief)
         if not isinstance(latency, bool):
             raise ValueError(f"latency must be True or False, got {latency!r}")
-        self.caution, self.latency = caution_at(level), latency
-        self._tube = tube_at(self.belief, level, promise)
+        self.caution, self.latency = caution_for(self.belief, level, promise), latency
         self.estimator = Estimator(self.belief, weathered=level > 0)
         self.simulation = self.estimator.simulation
         self._envelope, self._scratch = packed(self.belief.envelope), np.zeros(2 * VESSEL)
@@ -228,7 +227,7 @@ class Shield:
             conditions=np.array(conditions),
             margin=self.caution.margin,
             room=self.caution.room,
-            tube=self._tube,
+            tube=self.caution.tube,
             since=self.belief.period if self.latency else 0.0,
             proposed=np.ascontiguousarray(np.minimum(np.maximum(proposed, self._low), self._high)),
             spheres=spheres.reshape(count, -1),

@@ -6,163 +6,41 @@ left of its sway. Rest under water does not last, so what is held is verified ag
 is not safe any more.
 """
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym._memory import shifted, view
-from hydrone_gym.control.reference import clamp
-from hydrone_gym.physics.kinematics import State
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
-from hydrone_gym.simulation.rollout import Lane, propagate
+from hydrone_gym.simulation.rollout import propagate
 from hydrone_gym.simulation.storage import REFERENCE, VESSEL, Pose
 from hydrone_gym.surface import is_air
+from planners.check import (
+    AIR_GATE,
+    WATER_GATE,
+    Check,
+    careless,
+    copy_vessel,
+    inside,
+    keeps_room,
+    margin_after,
+    sensed,
+    single,
+    state_of,
+)
 from planners.clearance import clearance_between
-
-AIR_GATE = 1.1  # m above the surface: crossings begin or end here; from 1.4 m the exit would lie beyond sensing
-WATER_GATE = 1.0  # m below the surface
 
 HELD = -1  # what was verified last goes on
 RETREAT = -2  # nor is that safe any more: the vehicle turns under water and swims against its drift
-MARGIN = 0.05  # m of clearance that a stop keeps: what an estimate of the position may be wrong by
-GIVE = 0.002  # m: how much nearer than now a vehicle within the margin may come; more would add up
-LEAST_MARGIN = 0.005  # m
 LOOK_AHEAD = 6.0  # s that a stop is simulated for: from 2 m/s in air it takes 4.5, out of the water 5.5
 _RETREAT_AHEAD = 10.0  # s that a retreat is simulated for: a quarter turn takes five
 _RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
 _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
-_OBLIQUELY = ((2.3, 0.35), (2.3, -0.35), (-2.3, 0.35), (-2.3, -0.35))  # m ahead or astern, rad off the bow
+_OBLIQUELY = ((1.9, 0.35), (1.9, -0.35), (-1.9, 0.35), (-1.9, -0.35))  # m ahead or astern, rad off the bow
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
 _DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
 _CARRIED = 2.0  # s: the same in a current, which moves on what has been looked at for as long as a stop is
-_WALL = 0.1  # m: references keep this far inside the box
-_NEARER = 0.5  # share of its distance from the walls that a vehicle near one may use up
-TUBE_STEP = 0.5  # s
-TUBE_LENGTH = 14  # steps: a period, the stop after it, and latency
-
-
-class Check(NamedTuple):
-    """What every stop of a vehicle is checked with; pointers and numbers, made in a kernel."""
-
-    lane: Lane
-    goal: Any  # view of a `Point`
-    eye: Any  # the same: where the obstacles were last sensed from
-    world: Any  # view of a `WorldParams`
-    envelope: Any  # view of an `Envelope`
-    radius: float  # of the vehicle, m
-    margin: float  # clearance to keep, m, of a vehicle that is where it is believed to be
-    near: float  # clearance it has now, m, less `GIVE`: who is nearer than the margin keeps that
-    room: float  # m that a vehicle keeps from the walls, and its references more by `_WALL`
-    wall: float  # m that it may come near to the walls, whatever it should keep
-    tube: Any  # pointer to how far it may be from where it is believed to be, m, every `TUBE_STEP` after the look
-    since: float  # s since that look
-    period: float  # s
-    scratch: Any  # pointer to room for two vessels
-
-
-@inlined
-def inside(check, x, y, z):
-    """Keep the place of a reference inside the box."""
-    w, wall = check.world, _WALL + check.room
-    return (
-        clamp(x, w.x_min + wall, w.x_max - wall),
-        clamp(y, w.y_min + wall, w.y_max - wall),
-        clamp(z, w.z_min + wall, w.z_max - wall),
-    )
-
-
-@inlined
-def place_of(z):
-    """Return where a look is from, by height (m): 0 in air, 1 near the surface, 2 in water."""
-    return 1 if -WATER_GATE < z < AIR_GATE else 0 if is_air(z) else 2
-
-
-@inlined
-def astray(check, seconds):
-    """How far (m) a vehicle may be from where it is believed to be, some time after it began to fly."""
-    k = int(np.ceil((check.since + seconds) / TUBE_STEP - 1e-9)) - 1
-    return check.tube[max(0, min(k, TUBE_LENGTH - 1))]
-
-
-@inlined
-def margin_after(check, seconds):
-    """The clearance (m) to keep some time after a vehicle began to fly."""
-    return max(min(check.margin + astray(check, seconds), check.near), LEAST_MARGIN)
-
-
-@inlined
-def _from_walls(w, s):
-    """Distance (m) of a place from the nearest wall."""
-    across = min(min(s.x - w.x_min, w.x_max - s.x), min(s.y - w.y_min, w.y_max - s.y))
-    return min(across, min(s.z - w.z_min, w.z_max - s.z))
-
-
-@inlined
-def keeps_room(check, vessel, seconds):
-    """Whether a vehicle keeps its distance from the walls; in still weather that is for the outcome to say."""
-    if check.lane.weathered == 0:
-        return True
-    return _from_walls(check.world, state_of(vessel)) >= min(check.room + astray(check, seconds), check.wall)
-
-
-@inlined
-def wall_near(vessel, world):
-    """How near to the walls (m) a vehicle may come, whatever it should keep: who is near must be free to move."""
-    return _NEARER * _from_walls(world, state_of(vessel))
-
-
-@inlined
-def single(x, y, z, psi):
-    """Round a reference to the precision of the action space: what is checked is what is flown."""
-    return (
-        np.float64(np.float32(x)),
-        np.float64(np.float32(y)),
-        np.float64(np.float32(z)),
-        np.float64(np.float32(psi)),
-    )
-
-
-@inlined
-def state_of(vessel):
-    """Look at the `State` of a vessel."""
-    return view(vessel, 0, State)
-
-
-@inlined
-def reference_of(vessel):
-    """Read the reference in force of a vessel, (x, y, z, psi)."""
-    r = view(vessel, REFERENCE, Pose)
-    return r.x, r.y, r.z, r.psi
-
-
-@inlined
-def copy_vessel(source, target):
-    """Copy a vehicle with its reference."""
-    for k in range(VESSEL):
-        target[k] = source[k]
-
-
-@inlined
-def clearance_left(vessel, lane, radius):
-    """Clearance (m) that a vehicle has now, less `GIVE`.
-
-    Who is nearer to an obstacle than the margin keeps this instead: a vehicle that drifted or stopped within the margin
-    could never move again.
-    """
-    p = state_of(vessel)
-    return clearance_between((p.x, p.y, p.z), (p.x, p.y, p.z), lane, 0, radius) - GIVE
-
-
-@inlined
-def sensed(check, vessel):
-    """Whether a vehicle is in space sensed from the eye: nothing unknown can be in the way there."""
-    s, eye = state_of(vessel), check.eye
-    dx, dy, dz = s.x - eye.x, s.y - eye.y, s.z - eye.z
-    reach = check.world.sensor_range - check.radius
-    return dx * dx + dy * dy + dz * dz <= reach * reach
 
 
 @inlined
@@ -189,7 +67,7 @@ def follow(check, start, end, reference, seconds):
     arrives = flown.outcome == GOAL
     on = flown.outcome == RUNNING or arrives
     seconds += check.period
-    apart = flown.clearance >= margin_after(check, seconds) and keeps_room(check, end, seconds)
+    apart = flown.clearance >= margin_after(check, seconds) and keeps_room(check, end)
     safe = on and apart and smooth and sensed(check, end)
     return safe, arrives, flown.crossings > 0.0
 
@@ -298,13 +176,20 @@ def verify(check, vessel, reference):
     return can_stop(check, end, check.period)
 
 
-@inlined
-def _careless(check):
-    """The same check, but for margins: nothing may be touched."""
-    c, tight = check, LEAST_MARGIN
-    return Check(
-        c.lane, c.goal, c.eye, c.world, c.envelope, c.radius, tight, tight, 0.0, 0.0, c.tube, c.since, c.period, c.scratch
-    )
+@routine
+def _held_in_air(check, vessel, held):
+    """Return what a vehicle goes on with that is in air, or on its way there: what it holds, or a hover where it is.
+
+    What was verified for a vehicle that comes out of the water somewhere may be the wrong thing where it came out.
+    """
+    if not is_air(state_of(vessel).z):
+        return held
+    spare = shifted(check.scratch, VESSEL)
+    copy_vessel(vessel, spare)
+    if rests(check, spare, held, LOOK_AHEAD, 0.0):
+        return held
+    hovers, hover = can_hover(check, vessel, 0.0)
+    return hover if hovers else held
 
 
 @routine
@@ -317,14 +202,16 @@ def goes_on(check, vessel, held):
     not called back: at the surface current and waves carry it along.
     """
     s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
-    if is_air(s.z) or (check.lane.weathered > 0 and is_air(held[2])):
+    if check.lane.weathered == 0 and is_air(s.z):
         return HELD, held
+    if is_air(held[2]) or is_air(s.z):
+        return HELD, _held_in_air(check, vessel, held)
     copy_vessel(vessel, spare)
     if rests(check, spare, held, _RETREAT_AHEAD, 0.0):
         return HELD, held
-    near = _careless(check)
+    near = careless(check)
     if check.lane.weathered > 0:
-        gets_away, away = _gets_away(near, vessel, _RETREAT_AHEAD, 0.0)
+        gets_away, away = _gets_away(near, vessel, LOOK_AHEAD, 0.0)
         if gets_away:
             return RETREAT, away
     scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)

@@ -21,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.belief import Belief
-from planners.stop_check import TUBE_LENGTH
+from planners.check import TUBE_LENGTH
 
 PLACES = ("air", "surface", "water")  # of a look, see `planners.stop_check.place_of`
 FILE = Path(__file__).parent / "tubes.json"
+NO_TUBE = np.zeros((len(PLACES), TUBE_LENGTH))
 
 
 class Tube(NamedTuple):
@@ -39,16 +40,9 @@ class Tube(NamedTuple):
         Raises ValueError for a share that so few flights cannot tell.
         """
         rank, most = math.ceil((len(self.scores) + 1) * promise), len(self.scores) / (len(self.scores) + 1)
-        if not 0.0 <= promise <= most:
-            raise ValueError(f"promise must be a share of flights from 0 to {most:.4g}, got {promise!r}")
-        return self.shape * self.scores[rank - 1] if rank else np.zeros((len(PLACES), TUBE_LENGTH))
-
-
-def tube_at(belief: Belief, level: int, promise: float | None) -> NDArray[np.float64]:
-    """Return the tube (3, TUBE_LENGTH) in m for a promise, all zero for none, and in still weather."""
-    if promise is None or level == 0:
-        return np.zeros((len(PLACES), TUBE_LENGTH))
-    return tube_of(belief, level).at(promise)
+        if isinstance(promise, bool) or not isinstance(promise, int | float) or not 0.0 < promise <= most:
+            raise ValueError(f"promise must be a share of flights above 0 and at most {most:.4g}, got {promise!r}")
+        return self.shape * self.scores[rank - 1]
 
 
 @functools.cache

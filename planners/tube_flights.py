@@ -3,18 +3,18 @@
 import math
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrone_gym.envs import HydroneEnv
 from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.simulation import row_at
 from hydrone_gym.surface import in_air
 from planners.belief import Belief
+from planners.check import AIR_GATE, TUBE_LENGTH, TUBE_STEP, WATER_GATE
 from planners.disturbance import Estimator, Sight
 from planners.policy import Known, known
 from planners.shield import Shield
-from planners.stop_check import AIR_GATE, TUBE_LENGTH, TUBE_STEP, WATER_GATE
 from planners.straight_line import StraightLine
 from planners.tube import PLACES, Tube
 
@@ -53,7 +53,7 @@ def _predicted(
     stop: NDArray[np.float32],
     periods: int,
 ) -> NDArray[np.float64]:
-    """Return where the vehicle is believed to be after each period (periods, 3) of a reference and the stop after it."""
+    """Return where the vehicle is believed to be after each period (periods, 3) of a reference and its stop."""
     row: Any = row_at(now.state, now.goal)
     row["integral"], row["reference"] = now.integral, now.reference
     rollout, places = Rollout(estimator.simulation, np.zeros((0, 4)), estimator.conditions(sight)), []
@@ -79,8 +79,7 @@ def _flown(
 
 def flights_of(belief: Belief, level: int, weather: Any, count: int, seed: int) -> list[tuple[NDArray, NDArray]]:
     """Return the `deviations` of so many flights in a weather, with a shield that is ready for a level."""
-    env: Any = gym.make(
-        "HydroneGym/Mission-v0",
+    env = HydroneEnv(
         vehicle=belief.vehicle,
         controller=belief.law,
         period=belief.period,

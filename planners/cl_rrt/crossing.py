@@ -13,12 +13,12 @@ from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
+from planners.check import AIR_GATE, WATER_GATE, inside
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, zone_edge
 from planners.cl_rrt.printed import CROSS_LIMIT, SETTLE_LIMIT, cross_as_printed
 from planners.cl_rrt.references import air_reference, water_reference
 from planners.cl_rrt.tree import CROSSING, OPEN, SETTLING, node_state
 from planners.clearance import clearance_between
-from planners.stop_check import AIR_GATE, WATER_GATE, inside
 
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate

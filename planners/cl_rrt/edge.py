@@ -6,9 +6,9 @@ from hydrone_gym._jit import inlined, routine
 from hydrone_gym._memory import pointer
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import propagate, propagate_watched
+from planners.check import keeps_room, single
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import OPEN, node_state
-from planners.stop_check import keeps_room, single
 
 # How an edge ended
 BLOCKED = 0
@@ -24,7 +24,7 @@ def _judged(p, end, flown, margin):
     w, o, vertical = p.check.world, p.settings, p.check.world.vertical_mode > 0.0
     fast = flown.lateral_speed > (o.crossing_speed if vertical else SMOOTH * w.rough_speed)
     level = o.crossing_cos_tilt if vertical else 1.0 - SMOOTH * SMOOTH * (1.0 - w.rough_cos_tilt)
-    if flown.clearance < margin or fast or flown.cos_tilt < level or not keeps_room(p.check, end, 0.0):
+    if flown.clearance < margin or fast or flown.cos_tilt < level or not keeps_room(p.check, end):
         return BLOCKED
     if flown.outcome == GOAL:
         return ARRIVED

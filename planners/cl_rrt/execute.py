@@ -16,6 +16,17 @@ from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.surface import is_air
+from planners.check import (
+    LEAST_MARGIN,
+    Check,
+    clearance_left,
+    copy_vessel,
+    place_of,
+    reference_of,
+    sensed,
+    state_of,
+    wall_near,
+)
 from planners.cl_rrt.crossing import OF_DRIFT, near_wall
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
@@ -23,20 +34,8 @@ from planners.cl_rrt.objective import ObjectiveParams
 from planners.cl_rrt.settings import SettingParams
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, ROOT, Planner, node_state, prune_orphans, reroot
 from planners.clearance import clearance_between
-from planners.stop_check import (
-    LEAST_MARGIN,
-    Check,
-    can_hover,
-    clearance_left,
-    copy_vessel,
-    follow,
-    goes_on,
-    place_of,
-    reference_of,
-    sensed,
-    state_of,
-    wall_near,
-)
+from planners.stop_check import can_hover, follow, goes_on
+from planners.tube import NO_TUBE
 
 _BEND = 0.1  # m: how far an edge may leave its chord
 _CARRIED_TO = 0.85  # of the distance that crossings keep from walls is enough to begin one that was planned
@@ -51,7 +50,7 @@ class Constants(NamedTuple):
     envelope: NDArray[np.float64]
     settings: NDArray[np.float64]
     objective: NDArray[np.float64]
-    tube: NDArray[np.float64]  # (3, TUBE_LENGTH) m, by place of the look and time since
+    tube: NDArray[np.float64] = NO_TUBE  # (3, TUBE_LENGTH) m, by place of the look and time since
 
 
 class Query(NamedTuple):
@@ -63,7 +62,6 @@ class Query(NamedTuple):
     draws: NDArray[np.float64]  # uniform numbers for `expand_tree`
     size: int  # nodes in use
     root: int  # predicted node to root the tree at, -1 to begin a new tree
-    since: float  # s from the look to where the first edge begins
     known_before: int  # obstacles the tree was grown with
     held: NDArray[np.float64]  # (4,) reference of the backup that is next
     holds: bool  # whether that is its last, a hover, which may not be safe for ever
@@ -71,6 +69,7 @@ class Query(NamedTuple):
     iterations: int  # samples to grow by
     begin: bool  # whether this part of a cycle takes in the observation
     finish: bool  # and whether it chooses
+    since: float = 0.0  # s from the look to where the first edge begins
 
 
 @inlined

@@ -7,11 +7,11 @@ import numpy as np
 from hydrone_gym._jit import inlined, routine
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.surface import is_air
+from planners.check import AIR_GATE, WATER_GATE
 from planners.cl_rrt.edge import left_to_go
 from planners.cl_rrt.extend import extend, in_sight
 from planners.cl_rrt.objective import cost_to_go
 from planners.cl_rrt.tree import OPEN, node_state
-from planners.stop_check import AIR_GATE, WATER_GATE
 
 DRAWS = 6  # uniform numbers a sample
 # How far afield samples are sought

@@ -6,13 +6,13 @@ from hydrone_gym._jit import inlined, routine
 from hydrone_gym._memory import pointer, view
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
+from planners.check import AIR_GATE, WATER_GATE
 from planners.cl_rrt.crossing import column_is_free, cross, heading_under
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, edge, zone_edge
 from planners.cl_rrt.objective import crossing_point
 from planners.cl_rrt.references import air_reference, water_reference
 from planners.cl_rrt.tree import OPEN, node_state
 from planners.clearance import clearance_between
-from planners.stop_check import AIR_GATE, WATER_GATE
 
 _AIR_REACHED = 0.4  # m
 _WATER_REACHED = 0.5  # m: more than the hold radius

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hydrone_gym._memory import packed
 from planners.belief import Belief
-from planners.caution import caution_at
+from planners.caution import caution_for
 from planners.cl_rrt.execute import Constants, Query, cycle
 from planners.cl_rrt.expand import ANY_MEDIUM, CAREFUL, DRAWS, EDGE_TIME, STRAIGHT_ON
 from planners.cl_rrt.memory import Memory, Report, first_memory
@@ -21,12 +21,11 @@ from planners.cl_rrt.tree import BACKUP, Workspace
 from planners.cl_rrt.view import TreeView, tree_view
 from planners.disturbance import Estimator, Sight
 from planners.policy import Known, Observation, PlannerPolicy, known, whole_number
-from planners.tube import tube_at
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
-_PATIENCE = 15.0  # s of a flight after which a crossing keeps half as far from walls, for what a current may do
-_BOLDER = (1.0, 0.5, 0.25)  # of that distance, one after another
+_PATIENCE = 20.0  # s of a flight after which crossings keep less far from walls, for what a current may do
+_BOLDER = (1.0, 0.75, 0.5)  # of that distance, one after another
 _CAREFUL_AFTER, _ANY_MEDIUM_AFTER = 2, 8  # half seconds without a path before samples are sought further afield
 
 
@@ -76,7 +75,7 @@ class CLRRT(PlannerPolicy):
         if not isinstance(latency, bool):
             raise ValueError(f"latency must be True or False, got {latency!r}")
         self.belief = Belief.of(belief)
-        self.caution = caution_at(level)
+        self.caution = caution_for(self.belief, level, promise)
         self.estimator = Estimator(self.belief, weathered=level > 0)
         self.simulation = self.estimator.simulation
         self.time_budget = time_budget
@@ -85,12 +84,11 @@ class CLRRT(PlannerPolicy):
         self.settings = margins if settings is None else settings
         envelope = self.belief.envelope
         calm = self.belief.simulation()
-        costs, tube = objective_params(calm, objective), tube_at(self.belief, level, promise)
+        costs = objective_params(calm, objective)
         self.cruise_speed = safe_speed(calm, 2 if latency else 1)
-        self._constants = tuple(
-            Constants(packed(envelope), self._packed_settings(share, objective != "paper"), packed(costs), tube)
-            for share in _BOLDER
-        )
+        packs = (self._packed_settings(share, objective != "paper") for share in _BOLDER)
+        tube = self.caution.tube
+        self._constants = tuple(Constants(packed(envelope), pack, packed(costs), tube) for pack in packs)
 
     def _packed_settings(self, share: float, prune: bool) -> NDArray[np.float64]:
         """Pack the settings, with a share of the distance that crossings keep from walls."""

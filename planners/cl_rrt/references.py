@@ -7,7 +7,7 @@ from hydrone_gym._memory import view
 from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import REFERENCE, Pose
-from planners.stop_check import AIR_GATE, WATER_GATE, inside, state_of
+from planners.check import AIR_GATE, WATER_GATE, inside, state_of
 
 _LEAD = 0.75  # s at cruise speed it may be ahead: a reference that runs away drags the vehicle through obstacles
 _CARROT_TURNING = 0.6  # m ahead while misaligned: beyond the hold radius, too near to swim an arc

@@ -10,7 +10,7 @@ from hydrone_gym._memory import fields_of, pointer
 from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.simulation import STILL, Simulation
 from hydrone_gym.simulation.storage import VESSEL, Flown
-from planners.stop_check import Check, state_of
+from planners.check import Check, state_of
 
 # What a node is part of. Plain numbers would be literals, and Numba compiles what is handed one anew for each of them.
 OPEN = np.int64(0)  # ordinary: may be extended, can stop here

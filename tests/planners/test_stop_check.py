@@ -13,11 +13,12 @@ from hydrone_gym.simulation.simulation import Simulation, row_at
 from hydrone_gym.world.world import World
 from planners import CLRRT, CLRRTSettings
 from planners.caution import caution_at
+from planners.check import AIR_GATE, MARGIN
 from planners.cl_rrt.execute import Query, cycle
 from planners.cl_rrt.tree import BACKUP, Workspace, new_nodes
 from planners.policy import known
 from planners.shield import RETREAT, Shield
-from planners.stop_check import AIR_GATE, LOOK_AHEAD, MARGIN
+from planners.stop_check import LOOK_AHEAD
 
 VEHICLES = pytest.mark.parametrize("vehicle", [HYDRONE, HYDRONE_PHYSICAL], ids=lambda vehicle: vehicle.name)
 
