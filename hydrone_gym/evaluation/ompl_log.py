@@ -82,7 +82,7 @@ def _runs(rows: Sequence[Record], stored: Stored) -> list[str]:
     for policy in dict.fromkeys(row.policy for row in rows):
         origin, digest = (stored.arguments[part][policy] for part in ("policies", "digests"))
         flown = [row for row in rows if row.policy == policy]
-        lines += [" ".join(policy.split()), "2 common properties", f"origin = {origin}", f"code = {digest}"]
+        lines += [policy, "2 common properties", f"origin = {origin}", f"code = {digest}"]
         lines += [f"{len(properties)} properties for each run", *properties, f"{len(flown)} runs"]
         for row in flown:
             cells = (int(Outcome[row.outcome]), *(getattr(row, name) for name in kinds))
