@@ -45,7 +45,7 @@ class Take(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Replay(MissionOptions):
-    """Write a flight as a page that plays in a browser, offline, or as MCAP for Foxglove.
+    """Write a flight as a page that plays in a browser, offline, or for Foxglove.
 
     Of an evaluation, --mission, --policy and --world are those of its tables.
     """
