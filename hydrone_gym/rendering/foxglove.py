@@ -217,7 +217,7 @@ def _pose(position: ArrayLike, turn: Rotation = _LEVEL) -> _Message:
 
 
 def _points(points: ArrayLike) -> list[_Message]:
-    return [_xyz(point) for point in np.round(points, _DIGITS).reshape(-1, 3)]
+    return [_xyz(point) for point in np.asarray(points, dtype=np.float64).round(_DIGITS).reshape(-1, 3)]
 
 
 def _xyz(vector: ArrayLike) -> _Message:
