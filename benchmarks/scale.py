@@ -22,7 +22,10 @@ from rich.console import Console
 from benchmarks.tables import Sheet
 from benchmarks.timing import machine, save
 from hydrone_gym.evaluation import Record, evaluate, read_records
+from hydrone_gym.evaluation.plan import make_plan
 from hydrone_gym.evaluation.records import HEADER, to_line
+from hydrone_gym.evaluation.run import carry_out
+from hydrone_gym.evaluation.run_folder import RunFolder
 from hydrone_gym.evaluation.summary import summarise
 from hydrone_gym.evaluation.tables import markdown, tables_of
 
@@ -39,15 +42,23 @@ def spent(call: Callable[..., Any], *arguments: Any, **options: Any) -> tuple[fl
     return time.process_time() - start, result
 
 
+def a_flight(worlds: int, suite: str, policy: str, **options: Any) -> float:
+    """Return what one more flight takes of this process (s): so many worlds less a tenth of them, all else is equal."""
+
+    def fly(count: int) -> tuple[float, list[Record]]:
+        plan = make_plan(suite, policy, worlds=count)
+        with tempfile.TemporaryDirectory() as folder:
+            return spent(carry_out, plan, RunFolder(Path(folder), plan), **options)
+
+    fly(1)  # compiles, starts workers
+    (few, fewer), (many, more) = fly(worlds // 10), fly(worlds)
+    return (many - few) / (len(more) - len(fewer))
+
+
 def flights(worlds: int) -> dict[str, float]:
     """Return the processor time a flight takes (s), by policy: alone in paper-20, then a thousand worlds in a batch."""
-    seconds = {}
-    for suite, policies, count in (("paper-20", POLICIES, worlds), ("held-out", BATCHES, 1000)):
-        for policy in policies:
-            evaluate(suite, policy, worlds=1)  # compiles
-            used, records = spent(evaluate, suite, policy, worlds=count)
-            seconds[policy if suite == "paper-20" else f"{policy}, in batches"] = used / len(records)
-    return seconds
+    alone = {policy: a_flight(worlds, "paper-20", policy) for policy in POLICIES}
+    return alone | {f"{policy}, in batches": a_flight(1000, "held-out", policy) for policy in BATCHES}
 
 
 def checkpoint(folder: Path) -> dict[str, float]:
@@ -63,19 +74,12 @@ def checkpoint(folder: Path) -> dict[str, float]:
     return {"bytes": path.stat().st_size / ROWS, "read": reading / ROWS, "sum": summing / ROWS, "memory": memory / ROWS}
 
 
-def driver(backend: str, worlds: int) -> float:
+def driver(backend: str) -> float:
     """Return the processor time a flight costs the process that sends the worlds out and writes the rows (s)."""
-
-    def run() -> list[Record]:
-        with tempfile.TemporaryDirectory() as folder:
-            return evaluate("paper-20", "straight-line", worlds=worlds, jobs=2, backend=backend, out=folder)
-
-    run()  # starts and warms the workers
-    used, records = spent(run)
-    return used / len(records)
+    return a_flight(200, "paper-20", "straight-line", jobs=2, backend=backend)
 
 
-def on_two_nodes(worlds: int) -> float:
+def on_two_nodes() -> float:
     """Return the same for Ray, whose cluster has two nodes with one core each."""
     import ray
     from ray.cluster_utils import Cluster
@@ -85,7 +89,7 @@ def on_two_nodes(worlds: int) -> float:
         cluster.add_node(num_cpus=1)
         cluster.wait_for_nodes()
         ray.init(address=cluster.address, log_to_driver=False)
-        return driver("ray", worlds)
+        return driver("ray")
     finally:
         ray.shutdown()
         cluster.shutdown()
@@ -121,7 +125,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         measured: dict[str, Any] = {"flights": flights(options.worlds), "checkpoint": checkpoint(Path(folder))}
-    measured["driver"] = {"loky": driver("loky", 200), "ray, two nodes": on_two_nodes(200)}
+    measured["driver"] = {"loky": driver("loky"), "ray, two nodes": on_two_nodes()}
     for sheet in sheets(measured):
         Console().print(sheet)
     print(machine())
