@@ -133,19 +133,11 @@ def _standing(now: Moment, simulation: Simulation) -> _Entities:
     world, size = simulation.world, simulation.vehicle.arm * VEHICLE_SCALE
     colours = {"frame": style.BLACK, "front": style.RED, "rotors": UNKNOWN}
     yield "vehicle", {"triangles": [_mesh(model(shapes.MODEL[name], size), colour) for name, colour in colours.items()]}
-    bottom = world.lower[2]
-    yield (
-        "box",
-        {
-            "lines": [
-                _line(side.vertices, UNKNOWN, _LOOP) for side in walls(world.lower, world.upper, bottom, world.upper[2])
-            ]
-        },
-    )
-    yield (
-        "water",
-        {"cubes": [_slab(world, bottom, 0.0, style.WATER), _slab(world, -world.zone, world.zone, style.BLUE)]},
-    )
+    (_, _, bottom), (_, _, top) = world.lower, world.upper
+    sides = walls(world.lower, world.upper, bottom, top)
+    yield "box", {"lines": [_line(side.vertices, UNKNOWN, _LOOP) for side in sides]}
+    water, zone = _slab(world, bottom, 0.0, style.WATER), _slab(world, -world.zone, world.zone, style.BLUE)
+    yield "water", {"cubes": [water, zone]}
     yield "goal", {"spheres": [_sphere(now.goal, world.goal_radius, style.PURPLE, _GLASS)]}
 
 
