@@ -15,7 +15,7 @@ from hydrone_gym.weather import Spread, Weather
 from hydrone_gym.world.scenario import Scenario, load_scenario, save_scenario
 from hydrone_gym.world.world import World
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "HYDRONE",

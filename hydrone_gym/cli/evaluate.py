@@ -14,6 +14,7 @@ from gymnasium.error import DependencyNotInstalled
 from hydrone_gym._folder_lock import held
 from hydrone_gym.cli import refused
 from hydrone_gym.evaluation.backends import check_jobs
+from hydrone_gym.evaluation.ompl_log import write_ompl_logs
 from hydrone_gym.evaluation.page import write_report
 from hydrone_gym.evaluation.plan import Plan, make_plan
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES
@@ -55,6 +56,8 @@ class Evaluate:
     """Width of the files in figures/: inches, or column (3.5) or text (7.16); as on the page unless given."""
     no_title: bool = False  # Leave the titles out of the files in figures/.
     no_replays: bool = False  # Leave the replays out of the report.
+    export: Literal["ompl-log"] | None = None
+    """ompl-log also writes the folder's ompl/, a benchmark log of OMPL for each mission, for Planner Arena."""
     overwrite: bool = False  # Begin anew in a folder that holds another evaluation.
     json: bool = False  # Print the summary as one JSON document instead of the tables, and show no progress bar.
 
@@ -107,6 +110,8 @@ class Evaluate:
             records = carry_out(plan, folder, jobs=self.jobs, backend=self.backend, progress=not self.json)
         document, overview = write_results(plan, records, folder.folder, baseline=self.baseline, seconds=folder.seconds)
         paths = [folder.folder / name for name in (ROWS, SUMMARY, TABLES, LATEX)]
+        if self.export == "ompl-log":
+            paths += write_ompl_logs(folder.folder, plan)
         if self.report is not None:
             writer = None if self.no_replays else _replay_writer()
             width, titled = inches(self.width), not self.no_title

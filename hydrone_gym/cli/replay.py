@@ -1,4 +1,4 @@
-"""The subcommand `hydrone replay`: a flight as a page that plays in a browser."""
+"""The subcommand `hydrone replay`: a flight as a page that plays in a browser, or as MCAP."""
 
 import json
 import sys
@@ -22,6 +22,7 @@ from hydrone_gym.evaluation.records import Record, record_of
 from hydrone_gym.evaluation.run_folder import read_stored
 from hydrone_gym.evaluation.saved import SavedFlight, read_flights, restore
 from hydrone_gym.evaluation.shown import fly_record
+from hydrone_gym.rendering.foxglove import load_mcap, write_mcap
 from hydrone_gym.rendering.replay import load_viser, write_replay
 from hydrone_gym.rendering.stage import Tree
 from hydrone_gym.simulation.simulation import Simulation
@@ -29,10 +30,11 @@ from hydrone_gym.simulation.simulation import Simulation
 RECORDERS = "hydrone_gym.recorders"  # entry points: "trees" wraps a policy and keeps its trees as `trees`
 _ROW = ("policy", "suite", "mission", "world")  # options that name a row of an evaluation
 _PAGES = {"saved", "out", "open", "json"}
+_WRITERS = {".html": (load_viser, write_replay), ".mcap": (load_mcap, write_mcap)}  # by the suffix of a file
 
 
 class Take(NamedTuple):
-    """What one page shows."""
+    """What one file shows."""
 
     name: str
     title: str
@@ -43,7 +45,7 @@ class Take(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Replay(MissionOptions):
-    """Write a flight as a page that plays in a browser, offline.
+    """Write a flight as a page that plays in a browser, offline, or for Foxglove.
 
     Of an evaluation, --mission, --policy and --world are those of its tables.
     """
@@ -53,29 +55,33 @@ class Replay(MissionOptions):
     flight: str | None = None  # Of a flight.json: only the flight of this name.
     suite: str | None = None  # Of an evaluation: the suite, if there are several.
     world: int | None = None  # Of an evaluation: the number of the world.
-    out: Path = Path("replay.html")  # File to write, or folder for it; for several flights their names are appended.
+    out: Path = Path("replay.html")
+    """File to write, .html or .mcap, or folder for a page; for several flights their names are appended."""
     open: bool = False  # Open the page in the browser.
     json: bool = False  # Print one JSON document instead of the names of the files.
 
     def run(self) -> int:
         """Fly, write the pages and return the exit code."""
-        load_viser()
-        takes, shown, pages = self._takes(), [], []
-        out = self.out if self.out.suffix == ".html" else self.out / "replay.html"
+        out = self.out if self.out.suffix in _WRITERS else self.out / "replay.html"
+        if self.open and out.suffix != ".html":
+            raise ValueError(f"--open shows pages, .html, not {out}")
+        load, write = _WRITERS[out.suffix]
+        load()
+        takes, shown, files = self._takes(), [], []
         out.parent.mkdir(parents=True, exist_ok=True)
         for name, title, flight, simulation, trees in takes:
-            page = out if len(takes) == 1 else out.with_name(f"{out.stem}-{name}.html")
+            file = out if len(takes) == 1 else out.with_name(f"{out.stem}-{name}{out.suffix}")
             try:
-                write_replay(flight, simulation, page, title=title, trees=trees)
+                write(flight, simulation, file, title=title, trees=trees)
             except OSError as error:  # a full disk, after the input was found good
                 return refused(error, 1)
             facts = {"outcome": flight.outcome.name, "time": flight.time, "trees": sum(len(t.edges) > 0 for t in trees)}
-            shown.append({"name": name, "title": title, "page": str(page), **facts})
-            pages.append(page)
+            shown.append({"name": name, "title": title, "file": str(file), **facts})
+            files.append(file)
         document = {"format": "hydrone_gym replays", "version": 1, "replays": shown}
-        print(json.dumps(document, indent=1) if self.json else "\n".join(map(str, pages)))
-        for page in pages if self.open else ():
-            webbrowser.open(page.resolve().as_uri())
+        print(json.dumps(document, indent=1) if self.json else "\n".join(map(str, files)))
+        for file in files if self.open else ():
+            webbrowser.open(file.resolve().as_uri())
         return 0
 
     def _takes(self) -> list[Take]:

@@ -11,11 +11,11 @@ episode. `render_size` is width and height in pixels, even, from 64 to 4096. `ca
 
 docs/rendering.md shows both and how videos are made. A module imports only from lines below its own:
 
-    what is asked for   view (environments, windows) · video · replay (pages) · figures · comparison
+    what is asked for   view (environments, windows) · video · replay (pages) · foxglove · figures · comparison
     what is drawn on    frame (pictures) · stage (pages) · scene3d, files (figures)
     with what           shapes · raycast
     what rays meet      solids, backdrop
-    what there is       track (flights) · camera · paths · style
+    what there is       track (flights) · camera · paths · style · foxglove_schemas
 
 What an obstacle looks like, each of them asks `hydrone_gym.world.bodies`.
 """

@@ -20,7 +20,7 @@ from hydrone_gym.world.world import World
 
 # (N, 16) a row a tick: state (12), and reference x, y, z in m and yaw in rad (4); in weather its `Conditions` after
 Ticks = NDArray[np.float64]
-_CONDITIONS = 16  # where they begin
+CONDITIONS_AT = 16  # where they begin
 _ENDS = {
     Outcome.GOAL: "goal reached",
     Outcome.COLLISION: "collision",
@@ -86,7 +86,7 @@ class Moment(NamedTuple):
     def outdoors(self, world: World) -> Outdoors | None:
         """Return what there is to draw of the weather, None without any."""
         now = self.ticks[-1]
-        return outdoors(now[_CONDITIONS:], now[:3], self.time, world) if len(now) > _CONDITIONS else None
+        return outdoors(now[CONDITIONS_AT:], now[:3], self.time, world) if len(now) > CONDITIONS_AT else None
 
 
 def moments(last: Moment, counts: Iterable[int], sensor_range: float) -> Iterator[Moment]:
@@ -123,7 +123,7 @@ class Flown(Protocol):
 
     @property
     def trace(self) -> Any:
-        """Every tick: `states` (N, 12), `references` (N, 4), `conditions` (N, CONDITIONS), (N, 0) without weather."""
+        """Every tick: `times` (N,), `states` (N, 12), `references` (N, 4), `conditions` (N, CONDITIONS) or (N, 0)."""
 
 
 def moment_of(flight: Flown) -> Moment:

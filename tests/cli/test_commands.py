@@ -139,6 +139,13 @@ def test_version_and_module(capsys):
     assert shown.stdout == f"hydrone {hydrone_gym.__version__}\n"
 
 
+def test_the_version_is_the_same_wherever_it_stands():
+    version = re.escape(hydrone_gym.__version__)
+    assert re.search(rf"^version: {version}$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE)
+    newest = re.search(r"^## \[(.*)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    assert newest in (hydrone_gym.__version__, "Unreleased")
+
+
 def test_a_command_spelt_wrong_is_guessed(capsys):
     with pytest.raises(SystemExit):
         main(["fyl"])

@@ -38,13 +38,21 @@ def test_a_saved_flight_gives_the_page_of_the_fresh_one(flown, capsys):
     assert "tree of the planner" in page.read_text()
 
 
+def test_a_saved_flight_gives_the_mcap_file_of_the_fresh_one(flown, tmp_path, capsys):
+    fresh, saved = tmp_path / "fresh.mcap", tmp_path / "new" / "saved.mcap"
+    assert cli.main(["replay", *FLIGHT, "--out", str(fresh)]) == 0
+    assert cli.main(["replay", str(flown / "flight.json"), "--out", str(saved)]) == 0
+    assert capsys.readouterr().out == f"{fresh}\n{saved}\n"
+    assert saved.read_bytes() == fresh.read_bytes()
+
+
 def test_json_names_page_outcome_and_trees(flown, tmp_path, capsys):
     assert cli.main(["replay", str(flown / "flight.json"), "--json", "--out", str(tmp_path / "new")]) == 0
     (shown,) = json.loads(capsys.readouterr().out)["replays"]
     (record,) = json.loads((flown / "flight.json").read_text())["flights"]
     assert (shown["name"], shown["outcome"], shown["time"]) == ("air-to-water", "GOAL", record["time"])
     assert shown["title"] == "Air to water, clrrt, seed 4"
-    assert shown["page"] == str(tmp_path / "new" / "replay.html")
+    assert shown["file"] == str(tmp_path / "new" / "replay.html")
     assert shown["trees"] == len(record["references"])
 
 
@@ -105,6 +113,7 @@ def test_a_row_of_an_evaluation_is_flown_again(evaluated, tmp_path, capsys):
         (["RUN", "--mission", "MISSION"], "--world must be one of 0, 1, got None"),
         (["RUN", "--mission", "MISSION", "--world", "7"], "--world must be one of 0, 1, got 7"),
         (["EMPTY"], "there is no rows.csv"),
+        (["FLIGHT", "--open", "--out", "a.mcap"], "--open shows pages, .html, not a.mcap"),
     ],
 )
 def test_bad_input_gives_2_and_one_line(options, message, flown, evaluated, tmp_path, capsys):
@@ -114,7 +123,7 @@ def test_bad_input_gives_2_and_one_line(options, message, flown, evaluated, tmp_
     stand_for = {"FLIGHT": flown / "flight.json", "FOREIGN": tmp_path / "foreign.json", "RUN": evaluated}
     stand_for |= {"EMPTY": tmp_path / "empty", "MISSION": mission}
     arguments = [str(stand_for.get(option, option)) for option in options]
-    assert cli.main(["replay", *arguments, "--out", str(tmp_path / "new")]) == 2
+    assert cli.main(["replay", "--out", str(tmp_path / "new"), *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     (line,) = [line for line in err.splitlines() if not line.startswith("hydrone: compiling ")]
@@ -123,9 +132,16 @@ def test_bad_input_gives_2_and_one_line(options, message, flown, evaluated, tmp_
     assert not (tmp_path / "new").exists()
 
 
-def test_without_viser_nothing_is_flown(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "viser", None)
+@pytest.mark.parametrize(
+    ("module", "file", "message"),
+    [
+        ("viser", "a.html", 'replay pages need viser, part of the extra "replay"'),
+        ("mcap.writer", "a.mcap", 'MCAP files need mcap, part of the extra "mcap"'),
+    ],
+)
+def test_without_the_extra_nothing_is_flown(module, file, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr("hydrone_gym.cli.replay.fly", lambda *arguments, **options: pytest.fail("flown in vain"))
-    assert cli.main(["replay", *FLIGHT, "--out", str(tmp_path / "a.html")]) == 2
-    assert 'hydrone: error: replay pages need viser, part of the extra "replay"' in capsys.readouterr().err
+    assert cli.main(["replay", *FLIGHT, "--out", str(tmp_path / file)]) == 2
+    assert f"hydrone: error: {message}" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
