@@ -1,0 +1,167 @@
+"""The leaderboard: policies on the frozen suites whose worlds have a bound, ranked by score, in docs/leaderboard.md.
+
+    hydrone evaluate --suites weather --worlds 50 --policies mine=mine.py:Mine --out runs/mine
+    python -m benchmarks.leaderboard runs/mine      # enters what an evaluation holds, anew where it is there already
+    python -m benchmarks.leaderboard                # only writes the page
+    python -m benchmarks.leaderboard --difficulty   # first measures how hard the worlds are: five minutes
+
+Entries are in results/leaderboard.json, difficulties in results/difficulty.json.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium as gym
+import numpy as np
+import tyro
+
+from benchmarks.tables import Sheet, put_into
+from benchmarks.timing import RESULTS, ROOT, save
+from hydrone_gym.evaluation.bounds import GRID, bounds_of, load_bounds
+from hydrone_gym.evaluation.run_folder import read_stored
+from hydrone_gym.evaluation.statistics import Estimate
+from hydrone_gym.evaluation.suites import Mission, level_of, load_suite
+from hydrone_gym.evaluation.summary import PolicySummary, summarise
+from hydrone_gym.evaluation.tables import cell
+from hydrone_gym.world.scenario import Scenario
+from planners.belief import belief_of
+from planners.bound import Place, fastest_flights
+
+PAGE = ROOT / "docs" / "leaderboard.md"
+WORLDS = ("paper-20-v1", "weather-0-v1")  # the suites that have worlds of their own, every level of weather the same
+QUARTERS = 4
+COLUMNS = (
+    *("policy", "score [95 %]", "easiest to hardest quarter", "at the goal %", "collisions", "rough crossings"),
+    *("other", "time s", "keeps the rule %"),
+)
+_SHOWN = ("score", "success", "collisions", "rough_crossings", "others", "time", "zone_kept")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """What to enter."""
+
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Folders of `hydrone evaluate`, all worlds flown that have a bound, with the paper's vehicle."""
+    difficulty: bool = False
+    """Measure how hard the worlds are."""
+    results: Path = RESULTS
+    """Folder of leaderboard.json and difficulty.json."""
+    page: Path = PAGE
+    """The page whose tables are written."""
+
+
+def difficulties(suite: str) -> dict[str, list[float]]:
+    """Return of each mission's worlds that have a bound how much longer that is than without any sphere, as a share."""
+    bounds, found, seen = load_bounds(suite, "paper"), dict[str, list[float]](), dict[Any, float]()
+    for mission in load_suite(suite).missions:
+        found[mission.name] = []
+        for world, scenario in enumerate(mission.scenarios):
+            if (bound := bounds.get((mission.name, world))) is not None and bound.free is not None:
+                ends = (scenario.start, scenario.goal)
+                if ends not in seen:
+                    seen[ends] = empty_time(mission, scenario)
+                found[mission.name].append(bound.free.time / seen[ends] - 1.0)
+    return found
+
+
+def empty_time(mission: Mission, scenario: Scenario) -> float:
+    """Search for the fastest flight between the ends of a scenario where there is no sphere; return its time in s."""
+    env = gym.make(mission.env_id, disable_env_checker=True, num_obstacles=0)
+    place = Place(scenario.start, np.array(scenario.goal), np.zeros((0, 4)))
+    _, free = fastest_flights(belief_of(env), place, grid=GRID)
+    assert free is not None
+    return free.time
+
+
+def quarters_of(worlds: dict[str, list[float]]) -> dict[tuple[str, int], int]:
+    """Return of each mission and world in which quarter it is, by difficulty within its mission; 0 is the easiest."""
+    parts = {mission: np.array_split(np.argsort(hard, kind="stable"), QUARTERS) for mission, hard in worlds.items()}
+    return {(m, int(k)): quarter for m, each in parts.items() for quarter, part in enumerate(each) for k in part}
+
+
+def entries(folder: Path, hard: dict[str, dict[str, list[float]]]) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return what a folder says of every suite and policy; ValueError unless it flew all worlds that have a bound."""
+    stored = read_stored(folder)
+    if stored.arguments["vehicle"] != "paper":
+        raise ValueError(f"{folder}: the vehicle must be paper, is {stored.arguments['vehicle']}")
+    bounds, found = bounds_of(stored.arguments), dict[str, dict[str, dict[str, Any]]]()
+    for suite in stored.arguments["suites"]:
+        records = [record for record in stored.records if record.suite == suite]
+        still = "weather-0-v1" if level_of(suite) is not None else suite
+        wanted = {key for key in bounds if key[0] == suite}
+        if not wanted or {record.key[:3] for record in records} != wanted:
+            flown = len({record.key[:3] for record in records})
+            raise ValueError(f"{folder}: of {suite} must fly the {len(wanted)} worlds that have a bound, flew {flown}")
+        quarter = quarters_of(hard[still])
+        parts = [[r for r in records if quarter[r.mission, r.world] == part] for part in range(QUARTERS)]
+        scores = [{p.policy: p.score.value for p in summarise(part, bounds=bounds)[-1].policies} for part in parts]
+        about = {"commit": stored.document["commit"], "date": stored.document["date"], "flights": len(wanted)}
+        found[suite] = {
+            p.policy: {**_plain(p), "quarters": [score[p.policy] for score in scores], **about}
+            for p in summarise(records, bounds=bounds)[-1].policies
+        }
+    return found
+
+
+def _plain(p: PolicySummary) -> dict[str, Any]:
+    others = p.timeouts + p.out_of_bounds + p.diverged
+    return {name: others if name == "others" else getattr(p, name) for name in _SHOWN}
+
+
+def sheets(boards: dict[str, dict[str, dict[str, Any]]]) -> list[Sheet]:
+    """Return a table of each suite and law, the best score first."""
+    made = []
+    for name in sorted(boards):
+        suite, law = name.split(", ")
+        level, ranked = level_of(suite), sorted(boards[name].items(), key=lambda e: (-e[1]["score"][0], e[0]))
+        air = "still air" if not level else f"weather of level {level}"
+        rows = [_row(rank, policy, entry) for rank, (policy, entry) in enumerate(ranked, start=1)]
+        made.append(Sheet(f"{suite}: {air}, {law} law", COLUMNS, rows))
+    return made
+
+
+def _row(rank: int, policy: str, entry: dict[str, Any]) -> tuple[str, ...]:
+    score, success, time, kept = (
+        entry[name] and Estimate(*entry[name]) for name in ("score", "success", "time", "zone_kept")
+    )
+    counts = tuple(str(entry[name]) for name in ("collisions", "rough_crossings", "others"))
+    parts = " ".join(f"{part:.2f}" for part in entry["quarters"])
+    rest = cell(time and time.value, 1), cell(kept and kept.value, 0, 100.0)
+    return (f"{rank}. `{policy}`", cell(score, 3), parts, cell(success, 1, 100.0), *counts, *rest)
+
+
+def section(boards: dict[str, dict[str, dict[str, Any]]]) -> str:
+    """Return the tables in Markdown, and what they were measured with."""
+    commits = sorted({entry["commit"] or "unknown" for board in boards.values() for entry in board.values()})
+    parts = [sheet.markdown() for sheet in sheets(boards)]
+    return "\n".join([*parts, f"`python -m benchmarks.leaderboard`; flown at commit {', '.join(commits)}.\n"])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    a = tyro.cli(Arguments, args=arguments, description=__doc__)
+    if a.difficulty:
+        measured = {"measured": {suite: difficulties(suite) for suite in WORLDS}}
+        save("difficulty", "python -m benchmarks.leaderboard --difficulty", measured, a.results)
+    try:
+        hard = json.loads((a.results / "difficulty.json").read_text(encoding="utf-8"))["measured"]
+        kept = a.results / "leaderboard.json"
+        boards = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+        for folder in a.folders:
+            law = read_stored(folder).arguments["controller"] or "paper"
+            for suite, board in entries(folder, hard).items():
+                boards.setdefault(f"{suite}, {law}", {}).update(board)
+        kept.write_text(json.dumps(boards, indent=1) + "\n", encoding="utf-8")
+        put_into(a.page, section(boards))
+    except (ValueError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
