@@ -3,7 +3,7 @@
     hydrone evaluate --suites weather --worlds 50 --policies mine=mine.py:Mine --out runs/mine
     python -m benchmarks.leaderboard runs/mine      # enters what an evaluation holds, anew where it is there already
     python -m benchmarks.leaderboard                # only writes the page
-    python -m benchmarks.leaderboard --difficulty   # first measures how hard the worlds are: five minutes
+    python -m benchmarks.leaderboard --difficulty evaluations/paper-20-v1    # first measures how hard the worlds are
 
 Entries are in results/leaderboard.json, difficulties in results/difficulty.json.
 """
@@ -15,24 +15,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import gymnasium as gym
 import numpy as np
 import tyro
 
 from benchmarks.tables import Sheet, put_into
-from benchmarks.timing import RESULTS, ROOT, save
-from hydrone_gym.evaluation.bounds import GRID, bounds_of, load_bounds
+from benchmarks.timing import RESULTS, ROOT
+from hydrone_gym.evaluation.bounds import bounds_of
 from hydrone_gym.evaluation.run_folder import read_stored
 from hydrone_gym.evaluation.statistics import Estimate
-from hydrone_gym.evaluation.suites import Mission, level_of, load_suite
+from hydrone_gym.evaluation.suites import level_of
 from hydrone_gym.evaluation.summary import PolicySummary, summarise
 from hydrone_gym.evaluation.tables import cell
-from hydrone_gym.world.scenario import Scenario
-from planners.belief import belief_of
-from planners.bound import Place, fastest_flights
 
 PAGE = ROOT / "docs" / "leaderboard.md"
 WORLDS = ("paper-20-v1", "weather-0-v1")  # the suites that have worlds of their own, every level of weather the same
+PLANNERS = ("straight-line", "straight-line-shield", "potential-field", "clrrt")  # whose scores say how hard a world is
 QUARTERS = 4
 COLUMNS = (
     *("policy", "score [95 %]", "easiest to hardest quarter", "at the goal %", "collisions", "rough crossings"),
@@ -47,35 +44,27 @@ class Arguments:
 
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Folders of `hydrone evaluate`, all worlds flown that have a bound, with the paper's vehicle."""
-    difficulty: bool = False
-    """Measure how hard the worlds are."""
+    difficulty: tuple[Path, ...] = ()
+    """Folders of `hydrone evaluate` with the planners in still air, to measure how hard the worlds are."""
     results: Path = RESULTS
     """Folder of leaderboard.json and difficulty.json."""
     page: Path = PAGE
     """The page whose tables are written."""
 
 
-def difficulties(suite: str) -> dict[str, list[float]]:
-    """Return of each mission's worlds that have a bound how much longer that is than without any sphere, as a share."""
-    bounds, found, seen = load_bounds(suite, "paper"), dict[str, list[float]](), dict[Any, float]()
-    for mission in load_suite(suite).missions:
-        found[mission.name] = []
-        for world, scenario in enumerate(mission.scenarios):
-            if (bound := bounds.get((mission.name, world))) is not None and bound.free is not None:
-                ends = (scenario.start, scenario.goal)
-                if ends not in seen:
-                    seen[ends] = empty_time(mission, scenario)
-                found[mission.name].append(bound.free.time / seen[ends] - 1.0)
+def difficulties(folder: Path) -> dict[str, dict[str, list[float]]]:
+    """Return of each mission's worlds in a folder that have a bound what the planners' mean score lacks to 1."""
+    stored = read_stored(folder)
+    bounds, found = bounds_of(stored.arguments), dict[str, dict[str, list[float]]]()
+    if (stored.arguments["controller"] or "paper") != "paper" or not set(PLANNERS) <= set(stored.policies):
+        raise ValueError(f"{folder}: difficulty is measured by {', '.join(PLANNERS)} under the paper's law")
+    for suite in set(stored.arguments["suites"]) & set(WORLDS):
+        found[suite] = {}
+        for key in sorted(key for key in bounds if key[0] == suite):
+            flown = [r for r in stored.records if r.key[:3] == key and r.policy in PLANNERS]
+            scores = [p.score.value for p in summarise(flown, bounds=bounds)[0].policies if p.score]
+            found[suite].setdefault(key[1], []).append(1.0 - float(np.mean(scores)))
     return found
-
-
-def empty_time(mission: Mission, scenario: Scenario) -> float:
-    """Search for the fastest flight between the ends of a scenario where there is no sphere; return its time in s."""
-    env = gym.make(mission.env_id, disable_env_checker=True, num_obstacles=0)
-    place = Place(scenario.start, np.array(scenario.goal), np.zeros((0, 4)))
-    _, free = fastest_flights(belief_of(env), place, grid=GRID)
-    assert free is not None
-    return free.time
 
 
 def quarters_of(worlds: dict[str, list[float]]) -> dict[tuple[str, int], int]:
@@ -100,7 +89,7 @@ def entries(folder: Path, hard: dict[str, dict[str, list[float]]]) -> dict[str, 
         quarter = quarters_of(hard[still])
         parts = [[r for r in records if quarter[r.mission, r.world] == part] for part in range(QUARTERS)]
         scores = [{p.policy: p.score.value for p in summarise(part, bounds=bounds)[-1].policies} for part in parts]
-        about = {"commit": stored.document["commit"], "date": stored.document["date"], "flights": len(wanted)}
+        about = {"version": stored.document["versions"]["hydrone-gym"], "date": stored.document["date"]}
         found[suite] = {
             p.policy: {**_plain(p), "quarters": [score[p.policy] for score in scores], **about}
             for p in summarise(records, bounds=bounds)[-1].policies
@@ -136,26 +125,33 @@ def _row(rank: int, policy: str, entry: dict[str, Any]) -> tuple[str, ...]:
 
 
 def section(boards: dict[str, dict[str, dict[str, Any]]]) -> str:
-    """Return the tables in Markdown, and what they were measured with."""
-    commits = sorted({entry["commit"] or "unknown" for board in boards.values() for entry in board.values()})
-    parts = [sheet.markdown() for sheet in sheets(boards)]
-    return "\n".join([*parts, f"`python -m benchmarks.leaderboard`; flown at commit {', '.join(commits)}.\n"])
+    """Return the tables in Markdown, and when they were flown."""
+    dates = sorted({entry["date"][:10] for board in boards.values() for entry in board.values()})
+    told = f"`python -m benchmarks.leaderboard`; flown from {dates[0]} to {dates[-1]}.\n" if dates else ""
+    return "\n".join([*(sheet.markdown() for sheet in sheets(boards)), told])
+
+
+def _read(path: Path) -> dict[str, Any]:
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     a = tyro.cli(Arguments, args=arguments, description=__doc__)
-    if a.difficulty:
-        measured = {"measured": {suite: difficulties(suite) for suite in WORLDS}}
-        save("difficulty", "python -m benchmarks.leaderboard --difficulty", measured, a.results)
     try:
-        hard = json.loads((a.results / "difficulty.json").read_text(encoding="utf-8"))["measured"]
-        kept = a.results / "leaderboard.json"
-        boards = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+        hard = _read(a.results / "difficulty.json")
+        for folder in a.difficulty:
+            hard.update(difficulties(folder))
+        _write(a.results / "difficulty.json", hard)
+        boards = _read(a.results / "leaderboard.json")
         for folder in a.folders:
             law = read_stored(folder).arguments["controller"] or "paper"
             for suite, board in entries(folder, hard).items():
                 boards.setdefault(f"{suite}, {law}", {}).update(board)
-        kept.write_text(json.dumps(boards, indent=1) + "\n", encoding="utf-8")
+        _write(a.results / "leaderboard.json", boards)
         put_into(a.page, section(boards))
     except (ValueError, OSError) as error:
         print(error, file=sys.stderr)
