@@ -127,7 +127,7 @@ def _row(rank: int, policy: str, entry: dict[str, Any]) -> tuple[str, ...]:
 def section(boards: dict[str, dict[str, dict[str, Any]]]) -> str:
     """Return the tables in Markdown, and when they were flown."""
     dates = sorted({entry["date"][:10] for board in boards.values() for entry in board.values()})
-    told = f"`python -m benchmarks.leaderboard`; flown from {dates[0]} to {dates[-1]}.\n" if dates else ""
+    told = f"`python -m benchmarks.leaderboard`; flown on {', '.join(dates)}.\n"
     return "\n".join([*(sheet.markdown() for sheet in sheets(boards)), told])
 
 

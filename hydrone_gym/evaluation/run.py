@@ -52,7 +52,7 @@ def evaluate(
         worlds: the first so many of each mission, None for all.
         seed: given to policies that draw; every flight starts with it anew.
         vehicle: parameter set, "paper" or "physical".
-        controller: control law, "paper" or "robust"; None for that of the suites' options, which frozen ones leave open.
+        controller: control law, "paper" or "robust"; None for that of the suites, in frozen ones the paper's.
         jobs: flights at once.
         backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
             this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
