@@ -86,6 +86,8 @@ def entries(folder: Path, hard: dict[str, dict[str, list[float]]]) -> dict[str, 
         if not wanted or {record.key[:3] for record in records} != wanted:
             flown = len({record.key[:3] for record in records})
             raise ValueError(f"{folder}: of {suite} must fly the {len(wanted)} worlds that have a bound, flew {flown}")
+        if still not in hard:
+            raise ValueError(f"{folder}: how hard the worlds of {still} are must be measured first, by --difficulty")
         quarter = quarters_of(hard[still])
         parts = [[r for r in records if quarter[r.mission, r.world] == part] for part in range(QUARTERS)]
         scores = [{p.policy: p.score.value for p in summarise(part, bounds=bounds)[-1].policies} for part in parts]

@@ -36,7 +36,7 @@ def test_it_runs_with_few_worlds(notebook, tmp_path, monkeypatch):
     worlds.source = "WORLDS = 1"
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
     resources = {"metadata": {"path": str(tmp_path)}}
-    client = NotebookClient(notebook, timeout=240, resources=resources, km=kernel_of_this_interpreter())
+    client = NotebookClient(notebook, timeout=480, resources=resources, km=kernel_of_this_interpreter())
     client.execute()
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 3

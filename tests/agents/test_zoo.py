@@ -26,7 +26,7 @@ def test_the_zoo_trains_with_a_recipe(model, steps, tmp_path):
     words = shlex.split(told.replace("\\\n", " ").replace("$RECIPES/ppo.yml", str(FOLDER / f"{name}.yml")))
     words[words.index("--algo") + 1] = name
     shorter = ["-n", str(steps), "--eval-freq", "4000", "--eval-episodes", "1", "--device", "cpu", "--num-threads", "1"]
-    done = completed([sys.executable, *words, *shorter], cwd=tmp_path)
+    done = completed([sys.executable, *words, *shorter], 480.0, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     run = tmp_path / "logs" / name / "HydroneGym-Mission-v0_1"
     assert (run / "evaluations.npz").is_file()  # flown between, in the same environment
