@@ -33,9 +33,9 @@ PLANNERS = ("straight-line", "straight-line-shield", "potential-field", "clrrt")
 QUARTERS = 4
 COLUMNS = (
     *("policy", "score [95 %]", "easiest to hardest quarter", "at the goal %", "collisions", "rough crossings"),
-    *("other", "time s", "keeps the rule %"),
+    *("other", "time s"),
 )
-_SHOWN = ("score", "success", "collisions", "rough_crossings", "others", "time", "zone_kept")
+_SHOWN = ("score", "success", "collisions", "rough_crossings", "others", "time")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +78,8 @@ def entries(folder: Path, hard: dict[str, dict[str, list[float]]]) -> dict[str, 
     stored = read_stored(folder)
     if stored.arguments["vehicle"] != "paper":
         raise ValueError(f"{folder}: the vehicle must be paper, is {stored.arguments['vehicle']}")
+    if not stored.document["complete"]:
+        raise ValueError(f"{folder}: the evaluation was stopped before its end: the same command finishes it")
     bounds, found = bounds_of(stored.arguments), dict[str, dict[str, dict[str, Any]]]()
     for suite in stored.arguments["suites"]:
         records = [record for record in stored.records if record.suite == suite]
@@ -117,13 +119,17 @@ def sheets(boards: dict[str, dict[str, dict[str, Any]]]) -> list[Sheet]:
 
 
 def _row(rank: int, policy: str, entry: dict[str, Any]) -> tuple[str, ...]:
-    score, success, time, kept = (
-        entry[name] and Estimate(*entry[name]) for name in ("score", "success", "time", "zone_kept")
-    )
+    score, success, time = (entry[name] and Estimate(*entry[name]) for name in ("score", "success", "time"))
     counts = tuple(str(entry[name]) for name in ("collisions", "rough_crossings", "others"))
     parts = " ".join(f"{part:.2f}" for part in entry["quarters"])
-    rest = cell(time and time.value, 1), cell(kept and kept.value, 0, 100.0)
-    return (f"{rank}. `{policy}`", cell(score, 3), parts, cell(success, 1, 100.0), *counts, *rest)
+    return (
+        f"{rank}. `{policy}`",
+        cell(score, 3),
+        parts,
+        cell(success, 1, 100.0),
+        *counts,
+        cell(time and time.value, 1),
+    )
 
 
 def section(boards: dict[str, dict[str, dict[str, Any]]]) -> str:
