@@ -60,7 +60,7 @@ def difficulties(folder: Path) -> dict[str, dict[str, list[float]]]:
         raise ValueError(f"{folder}: difficulty is measured by {', '.join(PLANNERS)} under the paper's law")
     for suite in set(stored.arguments["suites"]) & set(WORLDS):
         found[suite] = {}
-        for key in sorted(key for key in bounds if key[0] == suite):
+        for key in sorted({r.key[:3] for r in stored.records if r.suite == suite} & bounds.keys()):
             flown = [r for r in stored.records if r.key[:3] == key and r.policy in PLANNERS]
             scores = [p.score.value for p in summarise(flown, bounds=bounds)[0].policies if p.score]
             found[suite].setdefault(key[1], []).append(1.0 - float(np.mean(scores)))

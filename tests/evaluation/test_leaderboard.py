@@ -29,7 +29,11 @@ def test_a_policy_written_from_the_page_is_ranked_by_its_command(tmp_path):
     assert command == "hydrone"
     done = completed([sys.executable, "-m", "hydrone_gym", *words, "--worlds", "4"], cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    cells = [line.split()[:2] for line in done.stdout.splitlines() if " [" in line and line[0].isalpha()]
+    cells = [
+        line.split()[:2]
+        for line in done.stdout.splitlines()
+        if line[:1].isalpha() and "] " in line and line[:6] != "policy"
+    ]
     ranked = {name: float(score) for name, score in cells}
     assert ranked.keys() == {"clrrt", "ppo-shield", "straight-line", "mine"}
     assert list(ranked.values()) == sorted(ranked.values(), reverse=True)
