@@ -33,6 +33,7 @@ from hydrone_gym.simulation.outcome import Outcome
 FIRST_SEED = 6_000_000  # above the worlds that training draws, below those held out
 METADATA, DATA = "metadata.json", "main_data.hdf5"
 OWN, FORMAT, SHA = "hydrone_gym", 1, "sha256"
+EXPERT, REFERENCE_FLIGHTS = "clrrt", 20  # what flies the reference scores, and in how many of the worlds held out
 INFOS = {"outcome": np.int64, "time": np.float64, "energy": np.float64, "clearance": np.float64}  # as stored
 _PACKAGES = (*provenance.PACKAGES, "minari")
 _KEYS = ("env_id", "options", "policy", "versions")
@@ -138,6 +139,27 @@ def demonstrate(env: gym.Env, policy: Policy, seed: int) -> Demonstration:
     )
 
 
+class _Random:
+    """Asks for places all over the box of references: the policy that Minari's least score is measured by."""
+
+    def __init__(self, env: gym.Env) -> None:
+        self._space = env.action_space
+        self._space.seed(0)
+
+    def predict(self, observation: Any, *_: Any, **__: Any) -> tuple[Any, None]:
+        return self._space.sample(), None
+
+
+def reference_scores(env: gym.Env) -> tuple[float, float]:
+    """Return the mean returns of random references and of the CL-RRT in the first `REFERENCE_FLIGHTS` held-out worlds.
+
+    They depend on the environment alone, so scores are comparable over all datasets of it.
+    """
+    seeds, random, expert = range(HELD_OUT, HELD_OUT + REFERENCE_FLIGHTS), _Random(env), find_policy(EXPERT)
+    least = np.mean([fly(env, random, seed=seed).episode_return for seed in seeds])
+    return float(least), float(np.mean([fly(env, expert.make(env, 0), seed=seed).episode_return for seed in seeds]))
+
+
 def record(recording: Recording) -> list[Path]:
     """Fly and write a dataset a mission; return their folders. A dataset appears only when it is complete.
 
@@ -177,6 +199,7 @@ def _write(folder: Path, dataset_id: str, env: gym.Env, source: PolicySource, re
     seeds = range(recording.seed, recording.seed + recording.flights)
     bar = tqdm(seeds, desc=env.spec.id, unit="flight", disable=not recording.progress)
     storage.update_episodes(EpisodeBuffer(**vars(demonstrate(env, source.make(env, seed), seed))) for seed in bar)
+    least, greatest = reference_scores(env)
     described = {
         "format": FORMAT,
         "env_id": env.spec.id,
@@ -192,6 +215,9 @@ def _write(folder: Path, dataset_id: str, env: gym.Env, source: PolicySource, re
             "minari_version": minari.__version__,
             "algorithm_name": source.label,
             "description": f"{recording.flights} flights of {source.label} on {env.spec.id}",
+            "eval_env_spec": env.spec.to_json(),
+            "ref_min_score": least,
+            "ref_max_score": greatest,
             "requirements": [f"hydrone-gym=={hydrone_gym.__version__}"],
             OWN: described,
             SHA: hashlib.sha256((folder / DATA).read_bytes()).hexdigest(),

@@ -1,4 +1,4 @@
-"""Pictures a CPU second at the end of a flight; and the pictures of docs/rendering.md.
+"""Pictures a CPU second at the end of a flight; and the pictures and the film of docs/rendering.md.
 
 python -m benchmarks.rendering
 python -m benchmarks.rendering --pictures
@@ -19,7 +19,9 @@ from hydrone_gym.evaluation import Flight, fly
 from hydrone_gym.rendering.camera import View
 from hydrone_gym.rendering.frame import Painter
 from hydrone_gym.rendering.track import moment_of, moments
+from hydrone_gym.rendering.video import frames, save_film
 from planners import CLRRT
+from planners.named import clrrt_weather
 
 DENSE = {"num_obstacles": 40, "obstacle_radius": freeze_suites.DENSE}
 SCENES: dict[str, tuple[dict[str, Any], View]] = {
@@ -29,6 +31,7 @@ SCENES: dict[str, tuple[dict[str, Any], View]] = {
     "320 x 240, 20 spheres": ({}, View(size=(320, 240))),
 }
 TICKS = 10  # pictures a call
+IMAGES = ROOT / "docs" / "images"
 PICTURES = {"frame.png": ("overview", 315), "frame-chase.png": ("chase", 105)}  # camera, ticks flown
 
 
@@ -39,7 +42,7 @@ class Settings:
     seconds: float = 0.5
     """CPU seconds a turn."""
     pictures: bool = False
-    """Draw docs/images/frame*.png instead."""
+    """Draw docs/images/frame*.png and weather-2.gif instead."""
 
 
 def flown(seed: int, options: dict[str, Any]) -> tuple[gym.Env, Flight]:
@@ -66,13 +69,16 @@ def scene(name: str) -> Contestant:
 
 
 def draw() -> None:
-    """Write the pictures of docs/rendering.md."""
+    """Write the pictures and the film of docs/rendering.md."""
     env, flight = flown(5, DENSE)
     world, vehicle = env.unwrapped.world, env.unwrapped.vehicle  # type: ignore[attr-defined]
     for name, (camera, ticks) in PICTURES.items():
         (moment,) = moments(moment_of(flight), [ticks], world.sensor_range)
         picture = Painter(View(camera=camera), world, vehicle).paint(moment)
-        Image.fromarray(picture).save(ROOT / "docs" / "images" / name, optimize=True)
+        Image.fromarray(picture).save(IMAGES / name, optimize=True)
+    env = gym.make("HydroneGym/AirToWater-v0", weather=2, controller="robust")
+    flight, world = fly(env, clrrt_weather(env), seed=12), env.unwrapped.world  # type: ignore[attr-defined]
+    save_film(frames(flight, size=(800, 500), every=3, world=world), IMAGES / "weather-2.gif", fps=12.5)
 
 
 def main(settings: Settings) -> None:

@@ -45,6 +45,7 @@ class Evaluate:
     worlds: int = 100  # First so many worlds of each mission.
     seed: int = 0  # Seed for policies that draw; the worlds are those of the suite.
     vehicle: Literal["paper", "physical", "hydrone-2021", "hydrone-agile"] = "paper"  # Parameter set of the vehicle.
+    controller: Literal["paper", "robust"] | None = None  # Control law; that of the suite, the paper's, unless given.
     baseline: str | None = None  # Policy that the others are compared with; clrrt if it is among them, else the first.
     jobs: int | None = None  # Flights at once, as many as there are cores unless given.
     backend: str = "loky"  # Backend of joblib: loky, threading, dask, ray.
@@ -74,7 +75,8 @@ class Evaluate:
         if self.report is None and (self.width is not None or self.no_title):
             raise ValueError("--width and --no-title are about the figures of a --report")
         inches(self.width)
-        plan = make_plan(self.suites, self.policies, worlds=self.worlds, seed=self.seed, vehicle=self.vehicle)
+        flown = {name: getattr(self, name) for name in ("worlds", "seed", "vehicle", "controller")}
+        plan = make_plan(self.suites, self.policies, **flown)
         labels = [policy.label for policy in plan.policies]
         if self.baseline is not None and self.baseline not in labels:
             raise ValueError(f"--baseline must be one of {', '.join(labels)}, got {self.baseline!r}")

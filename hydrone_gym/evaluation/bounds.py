@@ -5,6 +5,7 @@ the rule of the zone and the fastest of all, with every reference, so that they 
 """
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrone_gym.evaluation.suites import FOLDER, load_suite
+from hydrone_gym.evaluation.suites import FOLDER, level_of, load_suite
 
 GRID = 256.0  # references are multiples of 1/256 m and rad: exact in single precision, and small to store
 _FLIGHTS = ("kept", "free")  # names in a file: with the rule of the zone, and without
@@ -74,11 +75,13 @@ def _flights(arrays: Any, name: str) -> list[BoundFlight | None]:
 def bounds_of(arguments: Mapping[str, Any]) -> dict[tuple[str, str, int], Bound]:
     """Return the bounds of an evaluation's worlds, given its arguments, by suite, mission and world.
 
-    Only worlds of frozen suites have one, whose numbers are those that were flown, and not all of them.
+    Only worlds of frozen suites have one, whose numbers are those that were flown, and not all of them. In weather it
+    is that of the same world in still air.
     """
     found: dict[tuple[str, str, int], Bound] = {}
     for suite, fingerprint in arguments["suites"].items():
-        bounds = load_bounds(suite, arguments["vehicle"])
+        still = suite if level_of(suite) is None else re.sub(r"\d", "0", suite, count=1)
+        bounds = load_bounds(still, arguments["vehicle"], arguments["controller"] or "paper")
         if bounds and load_suite(suite).first(max(arguments["worlds"][suite].values())).fingerprint() == fingerprint:
             found |= {(suite, *place): bound for place, bound in bounds.items()}
     return found

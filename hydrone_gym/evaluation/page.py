@@ -117,6 +117,7 @@ def _facts(stored: Stored) -> dict[str, str]:
         "Worlds": "\n".join(_worlds(name, worlds) for name, worlds in arguments["worlds"].items()),
         "Flights": f"{len(stored.records):,}{finished}",
         "Vehicle": f"{arguments['vehicle']} parameters",
+        "Control law": arguments["controller"] or "that of the suite",
         "Seed": str(arguments["seed"]),
         "Date": document["date"],
         "Commit": document["commit"] or "unknown",

@@ -16,6 +16,7 @@ import gymnasium as gym
 import numpy as np
 
 import hydrone_gym  # noqa: F401  (registers the ids, also in a worker process)
+from hydrone_gym.control.laws import named_law
 from hydrone_gym.evaluation.flight import fly, fly_worlds
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory, PolicySource, find_policies, told
 from hydrone_gym.evaluation.provenance import sources
@@ -27,7 +28,7 @@ from hydrone_gym.world.scenario import Scenario
 WORLDS_A_JOB = 5  # enough that sending a job costs little, few enough that little is lost when one is cut short
 WORLDS_A_BATCH = 1000
 
-_FIXED = ("seed", "vehicle", "sources")  # arguments that every row depends on
+_FIXED = ("seed", "vehicle", "controller", "sources")  # arguments that every row depends on
 
 SuiteLike = str | Path | Suite
 PoliciesLike = str | Iterable[str] | Mapping[str, str | Factory]
@@ -76,10 +77,12 @@ class Plan:
     suites: tuple[Suite, ...]  # with no more worlds than are flown
     policies: tuple[PolicySource, ...]  # what flies them
     seed: int  # given to policies that draw
-    vehicle: str  # "paper" or "physical"
+    vehicle: str  # name of its parameter set
+    controller: str | None = None  # name of the control law; None for that of each mission's options
 
     def jobs(self) -> Iterator[Job]:
         """Yield all jobs: policies take turns on the same few worlds, so what is done is comparable at any moment."""
+        law = {} if self.controller is None else {"controller": self.controller}
         for suite in self.suites:
             most = WORLDS_A_BATCH if suite.batch else WORLDS_A_JOB
             for mission in suite.missions:
@@ -90,7 +93,7 @@ class Plan:
                         policy=policy,
                         seed=self.seed,
                         env_id=mission.env_id,
-                        options={**mission.options, "vehicle": self.vehicle},
+                        options={**mission.options, **law, "vehicle": self.vehicle},
                         suite=suite.name,
                         mission=mission.name,
                         worlds=part,
@@ -117,6 +120,7 @@ class Plan:
             "digests": {policy.label: policy.digest for policy in self.policies},
             "seed": self.seed,
             "vehicle": self.vehicle,
+            "controller": self.controller,
             "sources": sources(),
         }
 
@@ -126,7 +130,7 @@ class Plan:
         What may differ is what more is flown, and the code of policies.
         """
         now = self.arguments()
-        told = [f"{name} was {before[name]}, is {now[name]}" for name in _FIXED if before[name] != now[name]]
+        told = [f"{name} was {before.get(name)}, is {now[name]}" for name in _FIXED if before.get(name) != now[name]]
         suites = {suite.name: suite for suite in self.suites}
         for name, fingerprint in before["suites"].items():
             most = max(before["worlds"][name].values())
@@ -163,12 +167,15 @@ def make_plan(
     worlds: int | None = 100,
     seed: int = 0,
     vehicle: str = "paper",
+    controller: str | None = None,
 ) -> Plan:
     """Find suites and policies and check every argument; arguments and errors are those of `evaluate`."""
     for name, number, least in (("worlds", worlds, 1), ("seed", seed, 0)):
         if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < least):
             raise ValueError(f"{name} must be a whole number of at least {least}, got {number!r}")
     named_vehicle(vehicle)
+    if controller is not None:
+        named_law(controller, "controller")
     several = [suites] if isinstance(suites, str | Path | Suite) else list(suites)
     found = [[suite] if isinstance(suite, Suite) else load_suites(suite, worlds) for suite in several]
     loaded = [suite for suites in found for suite in suites]
@@ -176,7 +183,8 @@ def make_plan(
     if not names or len(set(names)) < len(names):
         raise ValueError(f"there must be at least one suite, and suites must have different names, got {names}")
     kept = tuple(suite if worlds is None else suite.first(worlds) for suite in loaded)
-    return Plan(suites=kept, policies=find_policies(policies), seed=seed, vehicle=vehicle)
+    found_policies = find_policies(policies)
+    return Plan(suites=kept, policies=found_policies, seed=seed, vehicle=vehicle, controller=controller)
 
 
 def plan_of(arguments: Mapping[str, Any]) -> Plan:
@@ -191,7 +199,8 @@ def plan_of(arguments: Mapping[str, Any]) -> Plan:
         if suites[-1].fingerprint() != fingerprint:
             raise ValueError(f"suite {name}: its worlds are not those that were flown; give the plan of the evaluation")
     policies = tuple(PolicySource.of_origin(label, origin) for label, origin in arguments["policies"].items())
-    return Plan(suites=tuple(suites), policies=policies, seed=arguments["seed"], vehicle=arguments["vehicle"])
+    flown = {name: arguments[name] for name in ("seed", "vehicle", "controller")}
+    return Plan(suites=tuple(suites), policies=policies, **flown)
 
 
 def fly_job(job: Job) -> tuple[list[Record], BrokenOff | None]:

@@ -35,6 +35,7 @@ def evaluate(
     worlds: int | None = 100,
     seed: int = 0,
     vehicle: str = "paper",
+    controller: str | None = None,
     jobs: int | None = None,
     backend: str | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -51,6 +52,7 @@ def evaluate(
         worlds: the first so many of each mission, None for all.
         seed: given to policies that draw; every flight starts with it anew.
         vehicle: parameter set, "paper" or "physical".
+        controller: control law, "paper" or "robust"; None for that of the suites, in frozen ones the paper's.
         jobs: flights at once.
         backend: of joblib, "loky", "threading", "dask" or "ray"; None for the one `joblib.parallel_config` has set,
             this process unless told otherwise. With processes, a script needs `if __name__ == "__main__":`.
@@ -64,7 +66,7 @@ def evaluate(
         BlockingIOError: another run is writing into `out`.
         EvaluationStopped: a policy raised in a flight, a worker died, or the disk is full. Finished rows are kept.
     """
-    plan = make_plan(suites, policies, worlds=worlds, seed=seed, vehicle=vehicle)
+    plan = make_plan(suites, policies, worlds=worlds, seed=seed, vehicle=vehicle, controller=controller)
     if out is None:
         return carry_out(plan, jobs=jobs, backend=backend)
     with held(out):

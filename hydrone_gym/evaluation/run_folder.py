@@ -29,7 +29,7 @@ RUN, ROWS, SUMMARY, TABLES, LATEX = "run.json", "rows.csv", "summary.json", "tab
 FORMAT = "hydrone_gym evaluation"
 VERSION = 1
 _PARTS = {"versions", "commit", "machine", "date", "seconds", "rows", "complete", "missions"}
-_PARTS |= {"suites", "worlds", "policies", "seed", "vehicle", "baseline"}  # these in the arguments
+_PARTS |= {"suites", "worlds", "policies", "seed", "vehicle", "controller", "baseline"}  # these in the arguments
 _MAPPINGS = ("suites", "worlds", "policies", "versions", "machine")
 
 

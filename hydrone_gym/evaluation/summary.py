@@ -25,7 +25,7 @@ class PolicySummary:
     """One policy on the worlds of a mission."""
 
     policy: str  #: its name
-    rank: int  #: from 1, by success, then by time
+    rank: int  #: from 1, by score; where worlds have no bound, by success, then by time
     worlds: int  #: flights
     success: Estimate  #: share that arrived, with the 95 % Wilson interval
     collisions: int  #: flights that ended so, as in the next four
@@ -127,7 +127,7 @@ def scores_of(records: Sequence[Record]) -> list[dict[str, Any]]:
 def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str, bounds: Bounds) -> MissionSummary:
     flown = {name: [r for r in records if r.policy == name] for name in dict.fromkeys(r.policy for r in records)}
     summed = [_policy(name, those, bounds) for name, those in flown.items()]
-    summed.sort(key=lambda p: (-p.success.value, np.inf if p.time is None else p.time.value))
+    summed.sort(key=_standing)
     compared = {(record.mission, record.world): record for record in flown.get(baseline, [])}
     comparisons = []
     for name in [p.policy for p in summed if p.policy != baseline]:
@@ -137,6 +137,11 @@ def _mission(suite: str, mission: str, records: Sequence[Record], baseline: str,
     return MissionSummary(
         suite=suite, mission=mission, baseline=baseline, policies=ranked, comparisons=tuple(comparisons)
     )
+
+
+def _standing(p: PolicySummary) -> tuple[float, float, float]:
+    """What policies are ranked by, the best first."""
+    return (-p.score.value if p.score else 0.0, -p.success.value, np.inf if p.time is None else p.time.value)
 
 
 def _policy(name: str, records: Sequence[Record], bounds: Bounds) -> PolicySummary:

@@ -12,7 +12,7 @@ from hydrone_gym.evaluation.summary import LIMITS, SLOWEST, Comparison, MissionS
 from hydrone_gym.rendering.comparison import shortened
 
 _WIDTH = 120  # characters that every table fits in; an overview fits in 80
-_NAME = 21  # characters of a policy in an overview
+_NAME = 20  # characters of a policy in an overview
 NONE = "–"
 _MIDDLE = "interquartile mean (of the middle half) with its 95 % bootstrap interval"
 
@@ -106,8 +106,8 @@ def _brief(p: PolicySummary) -> tuple[str, ...]:
     time = None if p.time is None else p.time.value
     kept = None if p.zone_kept is None else p.zone_kept.value
     success = f"{cell(p.success.value, 1, 100.0)} {cell(p.success, 0, 100.0).partition(' ')[2]}"
-    rest = cell(time, 1), cell(p.gap, 0, 100.0, "+"), cell(kept, 0, 100.0), cell(p.decision_ms_p99, 2)
-    return (shortened(p.policy, _NAME), success, *counts, *rest)
+    rest = cell(time, 1), cell(kept, 0, 100.0), cell(p.decision_ms_p99, 1)
+    return (shortened(p.policy, _NAME), cell(p.score and p.score.value, 3), success, *counts, *rest)
 
 
 def cell(value: Estimate | float | None, digits: int, scale: float = 1.0, sign: str = "") -> str:
@@ -188,8 +188,8 @@ _DIFFERENCES = _Kind(
 _OVERVIEW = _Kind(
     "in short",
     (
-        *("policy", "success (%)\n[95 %]", "colli-\nsions", "rough/\nother"),
-        *("time\n(s)", "gap\n(%)", "rule\n(%)", "p99\n(ms)"),
+        *("policy", "score", "success (%)\n[95 %]", "colli-\nsions", "rough/\nother"),
+        *("time\n(s)", "rule\n(%)", "p99\n(ms)"),
     ),
     _brief,
     (),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
+from PIL import Image
 
 from hydrone_gym.rendering.camera import View
 from hydrone_gym.rendering.frame import Painter
@@ -13,6 +14,10 @@ from hydrone_gym.rendering.track import Flown, moment_of, moments
 from hydrone_gym.simulation.simulation import TICK
 from hydrone_gym.vehicle import HYDRONE, Vehicle
 from hydrone_gym.world.world import World
+
+_COLOURS, _SAMPLES = 255, 6  # of a GIF: colours, and pictures they are chosen from
+_NONE = "a film must have at least one picture, got none"
+_HOLD = 2000  # ms that a GIF shows its last picture before it begins again
 
 
 def frames(
@@ -43,24 +48,41 @@ def frames(
 
 
 def save_film(pictures: Iterable[NDArray[np.uint8]], path: str | Path, *, fps: float = 1.0 / TICK) -> None:
-    """Write pictures (height, width, 3), all of one even size, such as `frames` yields, as an MP4 film.
+    """Write pictures (height, width, 3), all of one even size, such as `frames` yields, as an MP4 film or a GIF.
 
-    `fps` is pictures a second; the default plays those of every tick at the speed of the flight.
+    `fps` is pictures a second; the default plays those of every tick at the speed of the flight. A path that ends in
+    ".gif" gives a GIF of 255 colours, which begins again after two seconds on its last picture; it counts in 10 ms.
 
     Raises:
-        DependencyNotInstalled: without the extra `render`.
+        DependencyNotInstalled: for an MP4 film without the extra `render`.
         FileNotFoundError: the folder does not exist.
         ValueError: no picture.
     """
+    file = Path(path).absolute()
+    if not file.parent.is_dir():
+        raise FileNotFoundError(f"the folder of the film does not exist: {file.parent}")
+    (_save_gif if file.suffix == ".gif" else _save_mp4)(pictures, file, fps)
+
+
+def _save_gif(pictures: Iterable[NDArray[np.uint8]], file: Path, fps: float) -> None:
+    shown = [Image.fromarray(picture) for picture in pictures]
+    if not shown:
+        raise ValueError(_NONE)
+    samples = [shown[k] for k in np.linspace(0, len(shown) - 1, _SAMPLES).astype(int)]
+    # An octree keeps colours that cover few pixels, such as the path's.
+    palette = Image.fromarray(np.vstack(list(map(np.asarray, samples)))).quantize(_COLOURS, Image.Quantize.FASTOCTREE)
+    first, *rest = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in shown)
+    times = [round(1000.0 / fps)] * len(rest) + [_HOLD]
+    first.save(file, save_all=True, append_images=rest, duration=times, loop=0, optimize=True)
+
+
+def _save_mp4(pictures: Iterable[NDArray[np.uint8]], file: Path, fps: float) -> None:
     try:
         import imageio_ffmpeg  # type: ignore[import-untyped]
     except ImportError as error:
         raise DependencyNotInstalled(
             'films need imageio-ffmpeg, part of the extra "render": pip install "hydrone-gym[render]"'
         ) from error
-    file = Path(path).absolute()
-    if not file.parent.is_dir():
-        raise FileNotFoundError(f"the folder of the film does not exist: {file.parent}")
     film = None
     for picture in pictures:
         if film is None:
@@ -69,5 +91,5 @@ def save_film(pictures: Iterable[NDArray[np.uint8]], path: str | Path, *, fps: f
             film.send(None)
         film.send(np.ascontiguousarray(picture))
     if film is None:
-        raise ValueError("a film must have at least one picture, got none")
+        raise ValueError(_NONE)
     film.close()

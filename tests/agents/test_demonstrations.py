@@ -9,9 +9,9 @@ import minari
 import numpy as np
 import pytest
 
-from agents.demonstrations import Recording, demonstrate, find_datasets, load_demonstrations, record
+from agents.demonstrations import REFERENCE_FLIGHTS, Recording, demonstrate, find_datasets, load_demonstrations, record
 from hydrone_gym.cli import main
-from hydrone_gym.evaluation import HELD_OUT
+from hydrone_gym.evaluation import HELD_OUT, fly
 from hydrone_gym.evaluation.policies import find_policy
 
 OPTIONS = {"num_obstacles": 4, "vehicle": "physical"}
@@ -105,6 +105,32 @@ def test_minari_reads_it_and_makes_its_environment(root, monkeypatch):
     for episode, flight in zip(dataset.iterate_episodes(), own, strict=True):
         same(episode.actions, flight.actions)
         assert all(action in env.action_space for action in episode.actions)
+
+
+def test_scores_are_normalised_by_flights_of_held_out_worlds(root, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(root))
+    dataset = minari.load_dataset("HydroneGym/AirToWater-straight-line-v0")
+    env = dataset.recover_environment(eval_env=True)
+    assert env.spec.id == "HydroneGym/AirToWater-v0"
+    assert env.spec.kwargs.items() >= OPTIONS.items()
+    planner, returns = find_policy("clrrt"), []
+    for seed in range(HELD_OUT, HELD_OUT + REFERENCE_FLIGHTS):
+        returns.append(fly(env, planner.make(env, 0), seed=seed).episode_return)
+    assert minari.get_normalized_score(dataset, np.mean(returns)) == pytest.approx(1.0, abs=1e-12)
+    recorded = np.array([episode.rewards.sum() for episode in dataset.iterate_episodes()])
+    scores = minari.get_normalized_score(dataset, recorded)
+    assert ((scores > 0.3) & (scores < 1.2)).all()  # they arrive, as the CL-RRT does
+    env.action_space.seed(0)
+    returns = []
+    for seed in range(HELD_OUT, HELD_OUT + REFERENCE_FLIGHTS):
+        env.reset(seed=seed)
+        returns.append(0.0)
+        done = False
+        while not done:
+            _, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+            returns[-1] += reward
+            done = terminated or truncated
+    assert minari.get_normalized_score(dataset, np.mean(returns)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_actions_are_those_flown(tmp_path):

@@ -11,6 +11,7 @@ from hydrone_gym.simulation.outcome import Outcome
 
 WORLDS = (0, 7)
 FROZEN = 100  # worlds of each mission
+EXPERIMENTS = ("air-to-water", "water-to-air", "random")
 
 
 class Replay:
@@ -67,7 +68,20 @@ def test_bounds_belong_to_the_worlds_and_the_vehicle_they_were_searched_for():
     assert bounds_of(arguments)["paper-20-v1", "water-to-air", 2].kept is not None
     assert bounds_of({**arguments, "suites": {"paper-20-v1": "others"}}) == {}
     assert bounds_of({**arguments, "vehicle": "physical"}) == {}
-    assert bounds_of(make_plan("weather-3", ["straight-line"], worlds=1).arguments()) == {}
+    assert bounds_of(make_plan("dense-40", ["straight-line"], worlds=1).arguments()) == {}
+    robust = bounds_of(make_plan("paper-20", ["straight-line"], worlds=3, controller="robust").arguments())
+    assert robust["paper-20-v1", "water-to-air", 2].free.time < 14.0  # s; 18 under the paper's law
+
+
+def test_the_bounds_of_every_level_of_weather_are_those_of_still_air():
+    still = bounds_of(make_plan("weather-0", ["straight-line"], worlds=1).arguments())
+    assert {(mission, world) for _, mission, world in still} == {(m, k) for m in EXPERIMENTS for k in range(50)}
+    for name in ("weather-3", "weather-5-v1"):
+        windy = bounds_of(make_plan(name, ["straight-line"], worlds=1).arguments())
+        assert {key[1:]: bound.free.time for key, bound in windy.items()} == {
+            key[1:]: bound.free.time for key, bound in still.items()
+        }
+        assert {suite for suite, *_ in windy} == {f"{name.removesuffix('-v1')}-v1"}
 
 
 def test_what_is_saved_is_read_back(tmp_path, monkeypatch):

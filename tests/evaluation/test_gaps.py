@@ -76,6 +76,16 @@ def test_the_score_is_the_mean_over_the_worlds_that_have_a_bound():
     assert [p.score for p in summarise(rows)[0].policies] == [None, None]
 
 
+def test_policies_rank_by_score_where_worlds_have_a_bound():
+    """Slow and safe beats quick and lost, but not every failure weighs more than being slow."""
+    rows = [record("slow", k, time=60.0) for k in range(4)] + [record("lost", k, "COLLISION", 5.0) for k in range(4)]
+    rows += [record("quick", k, time=12.0) for k in range(3)] + [record("quick", 3, "TIMEOUT", 120.0)]
+    bounds = {(ROW.suite, "m", k): free(10.0) for k in range(4)}
+    ranks = {p.policy: p.rank for p in summarise(rows, bounds=bounds)[0].policies}
+    assert ranks == {"quick": 1, "slow": 2, "lost": 3}  # 3 x 0.83 of 4, 0.17 each, nothing
+    assert {p.policy: p.rank for p in summarise(rows)[0].policies} == {"slow": 1, "quick": 2, "lost": 3}
+
+
 def test_the_rule_of_the_zone_is_kept_up_to_its_limit():
     speeds = (0.05, 0.2, 0.21, 1.5, None)  # the last was never in the zone
     (summary,) = summarise([record("x", k, zone_speed=speed) for k, speed in enumerate(speeds)])

@@ -94,6 +94,18 @@ def test_the_vehicle_is_the_one_asked_for(serial):
     assert rows[1].energy not in [row.energy for row in serial]
 
 
+def test_the_control_law_is_the_one_asked_for_or_that_of_the_worlds(serial):
+    mission = load_suite("paper-20").missions[1]
+    env = gym.make(mission.env_id, **mission.options, controller="robust")
+    flight = fly(env, CLRRT.for_env(env), scenario=mission.scenarios[0])
+    rows = evaluate("paper-20", "clrrt", worlds=1, controller="robust")
+    assert (rows[1].time, rows[1].energy) == (flight.time, flight.energy)
+    named = Suite(name="robust", missions=(replace(mission, options={**mission.options, "controller": "robust"}),))
+    assert evaluate(named, "clrrt", worlds=1)[0].energy == flight.energy
+    paper = evaluate(named, "clrrt", worlds=1, controller="paper")[0]
+    assert paper.energy in [row.energy for row in serial]
+
+
 def test_only_shields_count_interventions(serial):
     for record in serial:
         assert (record.interventions is None) == (record.policy != "straight-line-shield")

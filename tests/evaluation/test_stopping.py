@@ -53,6 +53,7 @@ def test_a_finished_evaluation_flies_nothing(finished, monkeypatch):
     [
         ({"seed": 1}, "seed was 0, is 1"),
         ({"vehicle": "physical"}, "vehicle was paper, is physical"),
+        ({"controller": "robust"}, "controller was None, is robust"),
         (
             {"worlds": 3},
             "the worlds of paper-20-v1 were {'air-to-water': 7, 'water-to-air': 7}, are {'air-to-water': 3",
@@ -245,6 +246,7 @@ def test_a_block_that_is_written_in_part_is_written_to_its_end(tmp_path, monkeyp
         ({"jobs": 0}, "jobs must be a whole number of at least 1, at most 1024, got 0"),
         ({"jobs": 100_000}, "jobs must be a whole number of at least 1, at most 1024, got 100000"),
         ({"vehicle": "submarine"}, "submarine"),
+        ({"controller": "fuzzy"}, "controller must be one of 'paper', 'robust', got 'fuzzy'"),
         ({"backend": "carrier-pigeon"}, "carrier-pigeon"),
         ({"suites": ["paper-20", "paper-20-v1"]}, "suites must have different names"),
         ({"suites": []}, "at least one suite"),

@@ -6,6 +6,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
+from PIL import Image
 
 from hydrone_gym.evaluation import fly
 from hydrone_gym.rendering.video import frames, save_film
@@ -52,11 +53,32 @@ def test_a_film_lasts_as_long_as_the_flight(flown, tmp_path):
     assert tuple(meta["size"]) == SIZE
 
 
+def test_a_gif_shows_every_picture_in_its_colours_and_rests_at_the_end(flown, tmp_path):
+    flight, end = flown
+    path = tmp_path / "flight.gif"
+    save_film(frames(flight, size=SIZE, every=4), path, fps=12.5)
+    with Image.open(path) as gif:
+        assert (gif.size, gif.info["loop"]) == (SIZE, 0)
+        times = []
+        for k in range(gif.n_frames):
+            gif.seek(k)
+            times.append(gif.info["duration"])
+        assert gif.n_frames == len(range(len(flight.trace.times), 0, -4))
+        assert times == [80] * (gif.n_frames - 1) + [2000]
+        last = np.asarray(gif.convert("RGB"), float)
+    assert np.abs(last - end).mean() < 6.0  # of 255
+    orange = (end[..., 0] > 180) & (end[..., 2] < 60)  # the path and the front rotor
+    assert orange.sum() > 20
+    assert np.abs(last - end)[orange].mean() < 20.0
+
+
 def test_bad_films(tmp_path, monkeypatch):
     with pytest.raises(FileNotFoundError, match="the folder of the film does not exist"):
         save_film([np.zeros((64, 64, 3), np.uint8)], tmp_path / "none" / "film.mp4")
     with pytest.raises(ValueError, match="at least one picture, got none"):
         save_film([], tmp_path / "film.mp4")
+    with pytest.raises(ValueError, match="at least one picture, got none"):
+        save_film([], tmp_path / "film.gif")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(DependencyNotInstalled, match=r"hydrone-gym\[render\]"):
         save_film([], tmp_path / "film.mp4")
