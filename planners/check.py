@@ -13,6 +13,7 @@ from hydrone_gym.simulation.storage import REFERENCE, VESSEL, Pose
 from hydrone_gym.surface import is_air
 from planners.clearance import clearance_between
 
+OF_DRIFT = 0.5  # share of the drift that spheres are kept at: they are smaller than walls
 AIR_GATE = 1.1  # m above the surface: crossings begin or end here; from 1.4 m the exit would lie beyond sensing
 WATER_GATE = 1.0  # m below the surface
 MARGIN = 0.05  # m of clearance that a stop keeps: what an estimate of the position may be wrong by
@@ -37,6 +38,7 @@ class Check(NamedTuple):
     near: float  # clearance it has now, m, less `GIVE`: who is nearer than the margin keeps that
     room: float  # m that a vehicle keeps from the walls, and its references more by `_WALL`
     wall: float  # m that it may come near to the walls, whatever it should keep
+    drift: float  # m from the walls, and half as far from spheres, where crossings begin: a current carries it along
     tube: Any  # pointer to how far it may be from where it is believed to be, m, every `TUBE_STEP` after the look
     since: float  # s since that look
     period: float  # s
@@ -146,8 +148,18 @@ def sensed(check, vessel):
 
 
 @inlined
+def room_to_cross(check, x, y, share):
+    """Whether a vertical path through the zone clears every known obstacle and wall, by a share of the drift."""
+    w, away = check.world, share * check.drift
+    if x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away:
+        return False
+    near = clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), check.lane, 0, check.radius)
+    return near >= check.margin + OF_DRIFT * away
+
+
+@inlined
 def careless(check):
     """The same check, but for margins: nothing may be touched."""
     c, tight = check, LEAST_MARGIN
     around = (c.lane, c.goal, c.eye, c.world, c.envelope, c.radius)
-    return Check(*around, tight, tight, 0.0, 0.0, c.tube, c.since, c.period, c.scratch)
+    return Check(*around, tight, tight, 0.0, 0.0, 0.0, c.tube, c.since, c.period, c.scratch)

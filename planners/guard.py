@@ -27,6 +27,7 @@ class GuardQuery(NamedTuple):
     eyes: NDArray[np.float64]  # (n, 3) where the spheres were last sensed from, m
     conditions: NDArray[np.float64]  # (n, CONDITIONS) what each is believed to fly in; (n, 0) without weather
     margin: float  # clearance to keep, m
+    drift: float  # distance to keep from the walls where a crossing begins, m
     room: float  # distance to keep from the walls, m
     tube: NDArray[np.float64]  # (3, TUBE_LENGTH) m, by place of the look and time since
     since: float  # s from the look to where the references begin
@@ -96,7 +97,7 @@ def guard(query, rollout, envelope, candidates, scratch):
         row = query.rows[n]
         vessel, s = pointer(row), state_of(pointer(row))
         lane = of_row(whole, _keep_near(query.spheres[n], s, whole.obstacles), pointer(query.conditions[n]))
-        margins = query.margin, clearance_left(vessel, lane, radius), query.room, wall_near(vessel, world)
+        margins = query.margin, clearance_left(vessel, lane, radius), query.room, wall_near(vessel, world), query.drift
         tube = pointer(query.tube[place_of(s.z)])
         goal, eye = view(row.goal, 0, Point), view(query.eyes[n], 0, Point)
         around = (lane, goal, eye, world, limits, radius)

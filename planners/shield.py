@@ -227,6 +227,7 @@ class Shield:
             conditions=np.array(conditions),
             margin=self.caution.margin,
             room=self.caution.room,
+            drift=self.caution.drift,
             tube=self.caution.tube,
             since=self.belief.period if self.latency else 0.0,
             proposed=np.ascontiguousarray(np.minimum(np.maximum(proposed, self._low), self._high)),

@@ -9,8 +9,10 @@ is not safe any more.
 import numpy as np
 
 from hydrone_gym._jit import inlined, routine
-from hydrone_gym._memory import shifted, view
+from hydrone_gym._memory import gather, shifted, view
+from hydrone_gym.physics.immersion import Fluid
 from hydrone_gym.physics.trigonometry import sincos
+from hydrone_gym.simulation.conditions import AT as CONDITIONS_AT
 from hydrone_gym.simulation.outcome import GOAL, RUNNING
 from hydrone_gym.simulation.rollout import propagate
 from hydrone_gym.simulation.storage import REFERENCE, VESSEL, Pose
@@ -24,6 +26,7 @@ from planners.check import (
     inside,
     keeps_room,
     margin_after,
+    room_to_cross,
     sensed,
     single,
     state_of,
@@ -37,6 +40,9 @@ _RETREAT_AHEAD = 10.0  # s that a retreat is simulated for: a quarter turn takes
 _RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
 _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
 _OBLIQUELY = ((1.9, 0.35), (1.9, -0.35), (-1.9, 0.35), (-1.9, -0.35))  # m ahead or astern, rad off the bow
+_SMOOTH = 0.5  # share of a rough crossing's speed that one may have in weather, where waves add to it
+_RISING = 0.12  # m/s through the water that a vehicle may have sideways when it begins to rise out of it
+_COMMITTED = 0.4  # m from the surface: nearer, a crossing goes on
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
 _DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
@@ -63,7 +69,8 @@ def follow(check, start, end, reference, seconds):
     Returns (whether that is safe, arrives, passes the surface).
     """
     flown = propagate(check.lane, start, end, check.goal, reference)
-    smooth = flown.lateral_speed <= check.world.rough_speed and flown.cos_tilt >= check.world.rough_cos_tilt
+    most = check.world.rough_speed * (_SMOOTH if check.lane.weathered > 0 else 1.0)
+    smooth = flown.lateral_speed <= most and flown.cos_tilt >= check.world.rough_cos_tilt
     arrives = flown.outcome == GOAL
     on = flown.outcome == RUNNING or arrives
     seconds += check.period
@@ -157,7 +164,13 @@ def can_stop(check, vessel, after):
     Near the surface there are two ways to stop: go back to the side one is on, or finish the crossing. The second one
     is for those who have no plan of crossings: a planner that counted on it would enter the zone anywhere.
     """
-    spare = shifted(check.scratch, VESSEL)
+    s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
+    if check.lane.weathered > 0 and abs(s.z) < check.world.zone:  # who turns back is carried about at the surface
+        hover = hover_reference(check, vessel)
+        hover = single(hover[0], hover[1], AIR_GATE if s.vz > 0.0 else -WATER_GATE, hover[3])
+        copy_vessel(vessel, spare)
+        if rests(check, spare, hover, LOOK_AHEAD, after):
+            return True, hover
     stops, hover = can_hover(check, vessel, after)
     if stops or abs(state_of(vessel).z) > AIR_GATE:
         return stops, hover
@@ -166,11 +179,29 @@ def can_stop(check, vessel, after):
     return rests(check, spare, hover, LOOK_AHEAD, after), hover
 
 
+@inlined
+def _nears_surface(check, vessel, end):
+    """Whether a vehicle goes on toward the surface inside the transition zone, and need not yet."""
+    z, to_z = state_of(vessel).z, state_of(end).z
+    return abs(z) > _COMMITTED and abs(to_z) < check.world.zone and abs(to_z) < abs(z)
+
+
+@inlined
+def _sideways(check, s):
+    """Lateral speed (m/s) through the water that is believed to be around a vehicle that was just flown."""
+    fluid = gather(check.lane.weather, CONDITIONS_AT.fluid, 0, 1, Fluid)
+    vx, vy = s.vx - fluid.water_x, s.vy - fluid.water_y
+    return np.sqrt(vx * vx + vy * vy)
+
+
 @routine
 def verify(check, vessel, reference):
     """Return (whether a reference can be followed to rest, the hover that does it); the vessel is left as it is."""
     end = check.scratch
     safe, arrives, _ = follow(check, vessel, end, reference, 0.0)
+    if safe and check.lane.weathered > 0 and _nears_surface(check, vessel, end):
+        s = state_of(end)
+        safe = room_to_cross(check, s.x, s.y, 1.0) and (is_air(s.z) or _sideways(check, s) < _RISING)
     if arrives or not safe:
         return safe, hover_reference(check, end)
     return can_stop(check, end, check.period)
@@ -184,6 +215,10 @@ def _held_in_air(check, vessel, held):
     """
     if not is_air(state_of(vessel).z):
         return held
+    if state_of(vessel).vz > 0.0 and not is_air(held[2]):  # it has come out
+        hovers, hover = can_hover(check, vessel, 0.0)
+        if hovers:
+            return hover
     spare = shifted(check.scratch, VESSEL)
     copy_vessel(vessel, spare)
     if rests(check, spare, held, LOOK_AHEAD, 0.0):

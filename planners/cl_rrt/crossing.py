@@ -13,7 +13,7 @@ from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
-from planners.check import AIR_GATE, WATER_GATE, inside
+from planners.check import AIR_GATE, OF_DRIFT, WATER_GATE, inside
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, zone_edge
 from planners.cl_rrt.printed import CROSS_LIMIT, SETTLE_LIMIT, cross_as_printed
 from planners.cl_rrt.references import air_reference, water_reference
@@ -22,7 +22,6 @@ from planners.clearance import clearance_between
 
 _NEAR = 0.6  # m: a heading toward something nearer means nothing
 _AHEAD = 0.1  # s: a vehicle under water drifts on while it rises to the gate
-OF_DRIFT = 0.5  # share of it that spheres are kept at: they are smaller than walls
 _CLEAR_OF_ZONE = 0.02  # m
 _BRAKE = 0.75  # s of braking after which another way to brake is tried
 _BRAKE_LEAD = 0.3  # s: where a reference that brakes leads the vehicle

@@ -18,6 +18,7 @@ from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.surface import is_air
 from planners.check import (
     LEAST_MARGIN,
+    OF_DRIFT,
     Check,
     clearance_left,
     copy_vessel,
@@ -27,7 +28,7 @@ from planners.check import (
     state_of,
     wall_near,
 )
-from planners.cl_rrt.crossing import OF_DRIFT, near_wall
+from planners.cl_rrt.crossing import near_wall
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
@@ -255,6 +256,7 @@ def planner_of(work, query, constants):
         left,
         settings.room,
         wall_near(vessel, world),
+        settings.drift,
         pointer(constants.tube[place_of(state_of(vessel).z)]),
         query.since,
         lane.ticks * TICK,
