@@ -165,11 +165,27 @@ class Shield:
         place, stayed, detours = _watch(here, starts, state)
         aside = stayed < 0
         proposed = np.where(aside[:, None], _beside(place, in_force, detours), proposed)
+        proposed = self._turned(proposed, here, np.reshape(seen["goal"], (count, 3)))
         sent, held, choice = self.check(seen, proposed, held, eyes=here, sights=sights)
         interventions = np.where(starts, 0, state.interventions) + ((choice != 0) | aside)
         periods = np.where(starts, 0, state.periods) + 1
         new = ShieldState(inner, held, choice, interventions, periods, place, stayed, detours, sent, sights)
         return np.reshape(flown if self.latency else sent, np.shape(action)).astype(np.float32), new
+
+    def _turned(
+        self, proposed: NDArray[np.float64], here: NDArray[np.float64], goal: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return references that, in weather, turn who is to dive onto the line to the middle of the box.
+
+        Bow or stern then leave at once whichever wall an unknown current pushes to.
+        """
+        if not self.simulation.weathered:
+            return proposed
+        middle = 0.5 * (self._low[:2] + self._high[:2]) - here[:, :2]
+        turn = np.remainder(np.arctan2(middle[:, 1], middle[:, 0]) - proposed[:, 3] + 0.5 * np.pi, np.pi) - 0.5 * np.pi
+        dives = in_air(here[:, 2]) & ~in_air(goal[:, 2]) & (np.linalg.norm(middle, axis=1) > 1.0)
+        turned = np.remainder(proposed[:, 3] + turn + np.pi, 2.0 * np.pi) - np.pi
+        return np.column_stack([proposed[:, :3], np.where(dives, turned, proposed[:, 3])])
 
     def _look(
         self, observation: Mapping[str, NDArray], state: ShieldState, starts: NDArray[np.bool_]
