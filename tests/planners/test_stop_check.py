@@ -93,7 +93,7 @@ def test_what_cl_rrt_holds_under_water_is_verified_again():
         begin=True,
         finish=True,
     )
-    assert cycle(work, query, planner._constants)[1] == -1
+    assert cycle(work, query, planner._constants[0])[1] == -1
     np.testing.assert_array_equal(work.backup[0], retreat[0])
 
 
@@ -141,16 +141,49 @@ def test_in_wind_a_vehicle_that_leans_is_at_rest():
 
 
 def test_in_a_current_a_drift_that_stays_clear_is_a_stop():
-    """Six seconds flown and two more carried on: 12, as in still water, would end at the farther sphere too."""
+    """Six seconds flown and two more carried on: 12, as in still water, would end at the farther sphere too.
+
+    Where it does not stay clear, the stop is to drive off, ahead or astern, a little off the drift.
+    """
     _, shield, observation, (sight,) = settled(-2.5, 1)
     observation["state"][:], observation["integral"][:] = (0, 0, -2.5, 0, 0, 0, 0, 0.15, 0, 0, 0, 0), 0.0
     observation["reference"][:] = (0, 0, -2.5, 0)
-    here, passed = observation["reference"][None], []
+    here, stops = observation["reference"][None], []
     adrift = (sight._replace(estimate=np.array([0.0, 0.0, 0.0, 0.0, 0.15, 0.0])),)
     for distance in (2.55, 3.0):
         observation["obstacles"] = np.array([[0.0, distance, -2.5, 0.8]])
-        passed.append(shield.check(observation, here, here, sights=adrift)[2][0] == 0)
-    assert passed == [False, True]
+        _, held, choice = shield.check(observation, here, here, sights=adrift)
+        assert choice.tolist() == [0]
+        stops.append(held[0])
+    assert np.abs(stops[1][:3] - observation["state"][:3]).max() < 0.1
+    away = stops[0][:2] - observation["state"][:2]
+    assert np.hypot(*away) > 1.7
+    assert abs(away[0]) > 1.5
+    assert away[1] < 0.0
+
+
+def test_a_current_that_cannot_be_turned_against_in_time_is_left_obliquely():
+    """0.7 m from a wall, side on to a current toward it: a quarter turn takes five seconds, the wall is reached in two.
+
+    Held as it is the vehicle leaves the box; what the shield holds instead is flown, and stays inside.
+    """
+    env, shield, observation, (sight,) = settled(-2.5, 1)
+    observation["state"][:], observation["integral"][:] = (0, -9.3, -2.5, 0, 0, 0, 0, -0.3, 0, 0, 0, 0), 0.0
+    observation["reference"][:] = (0, -9.3, -2.5, 0)
+    observation["obstacles"] = np.zeros((1, 4))
+    here, steady = observation["reference"][None], np.array([0.0, 0.0, 0.0, 0.0, -0.35, 0.0])
+    adrift = (sight._replace(estimate=steady),)
+    sent, held, _ = shield.check(observation, here, here, sights=adrift)
+    conditions, least = shield.estimator.conditions(adrift[0]), []
+    for references in ([here[0]] * 10, [sent[0], *[held[0]] * 9]):
+        row, rollout = row_at(observation["state"]), Rollout(shield.simulation, np.zeros((0, 4)), conditions)
+        row["reference"] = observation["reference"]
+        places = []
+        for reference in references:
+            rollout.fly(row, reference)
+            places.append(row["state"][0, 1])
+        least.append(min(places))
+    assert least[0] < -10.0 < -9.95 < least[1]
 
 
 def test_in_weather_more_is_kept_from_walls_and_spheres():
@@ -165,7 +198,7 @@ def test_in_weather_more_is_kept_from_walls_and_spheres():
             rollout.fly(row, reference)
             ends[level].append(row["state"][0, 0])
     assert max(ends[3]) <= 9.85 < 9.88 < max(ends[0]) < 10.0
-    assert caution_at(3)._asdict() == pytest.approx(
+    assert {name: value for name, value in caution_at(3)._asdict().items() if name != "tube"} == pytest.approx(
         {
             "margin": 0.15,
             "edge_margin": 0.25,
@@ -173,7 +206,7 @@ def test_in_weather_more_is_kept_from_walls_and_spheres():
             "room": 0.15,
             "crossing_speed": 0.15,
             "crossing_tilt": np.radians(4.5),
-            "drift": 3.0,
+            "drift": 1.5,
         }
     )
 
