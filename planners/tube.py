@@ -38,10 +38,11 @@ class Tube(NamedTuple):
 
         Raises ValueError for a share that so few flights cannot tell.
         """
-        rank, most = math.ceil((len(self.scores) + 1) * promise), len(self.scores) / (len(self.scores) + 1)
+        count = len(self.scores)
+        most = count / (count + 1)
         if isinstance(promise, bool) or not isinstance(promise, int | float) or not 0.0 < promise <= most:
             raise ValueError(f"promise must be a share of flights above 0 and at most {most:.4g}, got {promise!r}")
-        return self.shape * self.scores[rank - 1]
+        return self.shape * self.scores[math.ceil((count + 1) * promise) - 1]
 
 
 @functools.cache

