@@ -81,11 +81,13 @@ class Shield:
         belief: the `Belief`, or any model, to check with.
         level: of the weather to be ready for, 0 to 5. Above 0 it estimates the disturbance from what it observes,
             checks with that, and keeps farther from everything, see `planners.caution.caution_at`.
+        promise: share of flights, in that level's weather, that should stay within what stops keep from spheres, see
+            `planners.tube`; None for margins that were tried.
         latency: True to use in each period what was chosen and checked during the one before: the policy is then asked
             what it would do in the predicted state. For policies that take a whole period.
 
     Raises:
-        ValueError: no level, a latency that is not True or False.
+        ValueError: no level, a promise that no tube can keep, a latency that is not True or False.
     """
 
     def __init__(

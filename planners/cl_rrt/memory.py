@@ -20,6 +20,7 @@ class Report(NamedTuple):
     arrives: bool  # whether that path ends at the goal
     seconds: float  # the cycle took
     waiting: int  # cycles since a path was last sent: above zero, the safety action is flown
+    refusal: str | None = None  # why it waits, where forces forbid what it should do; see `planners.refusal`
 
 
 @dataclass(frozen=True)

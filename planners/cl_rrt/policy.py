@@ -21,6 +21,7 @@ from planners.cl_rrt.tree import BACKUP, Workspace
 from planners.cl_rrt.view import TreeView, tree_view
 from planners.disturbance import Estimator, Sight
 from planners.policy import Known, Observation, PlannerPolicy, known, whole_number
+from planners.refusal import refusal
 
 _CHUNK = 8  # samples between looks at the clock
 _MOVED = 0.5  # m: a vehicle this far from its prediction was not flown by this planner; the tree is stale
@@ -44,14 +45,17 @@ class CLRRT(PlannerPolicy):
             (m), or "paper": the branch that ends closest to the goal, crossing where the line to a sample meets the
             transition zone. Where joules count, so does how fast to swim.
         level: of the weather to be ready for, 0 to 5. Above 0 it estimates the disturbance from what it observes,
-            predicts with that, and keeps farther from everything, see `planners.caution.caution_at`.
+            predicts with that, and keeps farther from everything, see `planners.caution.caution_at`. Its report says
+            why it waits, where forces forbid what it should do.
+        promise: share of flights, in that level's weather, that should stay within what stops keep from spheres: a
+            measured tube then takes the place of margins that were tried, see `planners.tube`. None for the margins.
         latency: True to use in each period what was planned during the one before, from the predicted state, as a
             vehicle must whose planning takes a whole period; it flies slower, to stop within what it sensed then.
         seed: of the random stream; every episode starts it anew.
         settings: see `CLRRTSettings`.
 
     Raises:
-        ValueError: a budget that is not positive, an unknown objective, no level.
+        ValueError: a budget that is not positive, an unknown objective, no level, a promise that no tube can keep.
     """
 
     def __init__(
@@ -113,7 +117,8 @@ class CLRRT(PlannerPolicy):
         work = self._workspace(memory.nodes.copy(), memory.backup.copy(), start, memory.sight)
         size, first, stop, end = self._run(work, start, eye, memory, started)
         if first < 0:
-            return self._safety_action(memory, work, size, time.perf_counter() - started)
+            why = refusal(self.belief, self.caution, memory.sight, start.goal[2])
+            return self._safety_action(memory, work, size, time.perf_counter() - started, why)
         nodes, depth, i = work.nodes, 0, end
         while i > 0:
             depth, i = depth + 1, int(nodes["parent"][i])
@@ -170,7 +175,7 @@ class CLRRT(PlannerPolicy):
 
     @staticmethod
     def _safety_action(
-        memory: Memory, work: Workspace, size: int, seconds: float
+        memory: Memory, work: Workspace, size: int, seconds: float, why: str | None
     ) -> tuple[NDArray[np.float64], Memory]:
         """Go on with the stop verified last; its final reference holds for good, but for a retreat under water."""
         if memory.stop > 1:
@@ -178,7 +183,7 @@ class CLRRT(PlannerPolicy):
         else:
             reference, backup, stop = work.backup[0], np.tile(work.backup[0], (BACKUP, 1)), 1
         waiting = memory.waiting + 1
-        report = Report(size, int(work.edges[0]), 0, np.inf, False, seconds, waiting)
+        report = Report(size, int(work.edges[0]), 0, np.inf, False, seconds, waiting, why)
         cycle, sight = memory.cycle + 1, memory.sight
         memory = Memory(memory.nodes, backup, stop, cycle=cycle, waiting=waiting, report=report, sight=sight)
         return reference.copy(), memory
