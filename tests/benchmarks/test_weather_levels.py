@@ -17,9 +17,9 @@ def told(value, half):
 @pytest.fixture
 def small(tmp_path, monkeypatch):
     """Two entrants of which one flies under both laws."""
-    monkeypatch.setattr(weather_levels, "AGENTS", {"paper": ("straight-line",), "robust": ("straight-line",)})
-    monkeypatch.setattr(weather_levels, "PLANNERS", {"paper": (), "robust": ("potential-field",)})
-    return Arguments(worlds=4, planner_worlds=2, levels=(0, 3), runs=tmp_path / "runs", out=tmp_path)
+    monkeypatch.setattr(weather_levels, "FAST", {"paper": ("straight-line",), "robust": ("straight-line",)})
+    monkeypatch.setattr(weather_levels, "SLOW", {"paper": (), "robust": ("potential-field",)})
+    return Arguments(worlds=4, slow_worlds=2, levels=(0, 3), runs=tmp_path / "runs", out=tmp_path)
 
 
 def test_entrants_fly_the_same_worlds_in_every_weather_under_their_laws(small):
@@ -59,7 +59,7 @@ def test_five_points_are_lost_at_the_first_level_that_loses_them():
 
 
 def test_the_command_prints_and_keeps_the_tables(small, capsys):
-    given = ["--worlds", "4", "--planner-worlds", "2", "--levels", "0", "3"]
+    given = ["--worlds", "4", "--slow-worlds", "2", "--levels", "0", "3"]
     assert weather_levels.main([*given, "--runs", str(small.runs), "--out", str(small.out)]) == 0
     printed = capsys.readouterr().out
     kept = json.loads((small.out / "weather_levels.json").read_text())
