@@ -137,8 +137,8 @@ def sheets(measured: dict[str, Any]) -> list[Sheet]:
         ("recipe", "worlds", "mission", f"seeds {seeds}, %", "mean ± deviation, %", "collisions, out, rough, diverged"),
         rows,
         [
-            f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo-shield` behind the "
-            "shield, the others alone. The last column counts flights of all seeds. "
+            f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo-shield`, and where "
+            "the worlds say so, behind the shield, else alone. The last column counts flights of all seeds. "
             f"{DENSE.name}: {DENSE.radii[0]}–{DENSE.radii[1]} m."
         ],
     )
