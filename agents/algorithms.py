@@ -29,7 +29,12 @@ _SAC = Algorithm(SAC, lambda policy: [*policy.actor.latent_pi, policy.actor.mu],
 _TD3 = _SAC._replace(model=TD3, mean=lambda policy: [*policy.actor.mu][:-1])  # the last module is its tanh
 
 # by the name of the recipe, agents/hyperparameters/<name>.yml
-ALGORITHMS = {"ppo": _PPO, "ppo-shield": _PPO, "sac": _SAC, "td3": _TD3, "tqc": _SAC._replace(model=TQC)}
+ALGORITHMS = {
+    **dict.fromkeys(("ppo", "ppo-shield", "ppo-weather"), _PPO),
+    "sac": _SAC,
+    "td3": _TD3,
+    "tqc": _SAC._replace(model=TQC),
+}
 
 _ACTIVATIONS: dict[type, str] = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
 

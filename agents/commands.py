@@ -26,7 +26,7 @@ class Train:
     _TRAINED: ClassVar = ("algorithm", "out", "seed", "steps", "recipe", "start_from", "obstacles", "vehicle")
 
     # Recipe; ppo-shield goes on behind the shield and wants --start-from.
-    algorithm: Annotated[Literal["ppo", "ppo-shield", "sac", "td3", "tqc"], tyro.conf.Positional] = "ppo"
+    algorithm: Annotated[Literal["ppo", "ppo-shield", "ppo-weather", "sac", "td3", "tqc"], tyro.conf.Positional] = "ppo"
     out: Path | None = None  # Run folder, runs/<algorithm>-<seed> unless given; must not hold a run already.
     seed: int = 0  # Seed of weights, missions and exploration.
     steps: int | None = None  # Transitions to learn from, the recipe's number unless given.

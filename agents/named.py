@@ -8,6 +8,7 @@ from planners.named import level_of
 from planners.shield import Shield
 
 ppo = partial(load_agent, "ppo")
+ppo_weather = partial(load_agent, "ppo-weather")
 sac = partial(load_agent, "sac")
 from_folder = load_agent
 
@@ -20,6 +21,11 @@ def ppo_shield(env: Any) -> Shield:
 def ppo_shield_weather(env: Any) -> Shield:
     """Return the same behind a shield that is ready for weather."""
     return Shield.for_env(load_agent("ppo-shield", env), env, level=level_of(env))
+
+
+def ppo_weather_shield(env: Any) -> Shield:
+    """Return the agent that learnt in weather, behind a shield that is ready for weather."""
+    return Shield.for_env(ppo_weather(env), env, level=level_of(env))
 
 
 def sac_shield(env: Any) -> Shield:

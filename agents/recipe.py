@@ -28,8 +28,10 @@ class Recipe:
     policy: str  # name of the policy class of Stable-Baselines3
     settings: dict[str, Any]  # the other arguments of the algorithm, as written in the file
     shield: bool = False  # whether the rows fly behind the shield
-    # keyword options of the environments that the rows fly in, where the defaults are not meant
+    # keyword options of the environments that the rows fly in, where the defaults are not meant; `weather` may be a
+    # list that rows share, see `MissionMix`
     environment: dict[str, Any] = field(default_factory=dict)
+    evaluation: dict[str, Any] = field(default_factory=dict)  # the same of the held-out worlds at the end
 
     def arguments(self) -> dict[str, Any]:
         """Return the settings as the algorithm takes them: schedules and noise made of their names, and completed.
@@ -70,4 +72,5 @@ def load_recipe(algorithm: str = "ppo", path: Path | None = None) -> Recipe:
         settings=settings,
         shield=content.get("shield", False),
         environment=content.get("environment", {}),
+        evaluation=content.get("evaluation", {}),
     )

@@ -100,7 +100,9 @@ POLICY = {
 }
 TOP = {
     "missions": _Rule("a mapping from ids of this project to rows, at least 1 each", _missions),
-    "environment": _Rule("a mapping of keyword options", lambda value: isinstance(value, dict)),
+    **dict.fromkeys(
+        ("environment", "evaluation"), _Rule("a mapping of keyword options", lambda value: isinstance(value, dict))
+    ),
     "shield": _YES,
 }
 
@@ -126,11 +128,19 @@ def check_entries(file: Path, content: Mapping[Any, Any], entry: str, algorithm:
     if missions is not None and sum(missions.values()) != settings["n_envs"]:
         raise ValueError(f"{file}: the rows of missions must sum to n_envs = {settings['n_envs']}, got {missions!r}")
     environment = content.get("environment", {})
-    _check(file, "environment.", environment, {}, set(known_options(VectorOptions)) - set(_FIXED))
+    several = environment.get("weather", 0)
+    for weather in several if isinstance(several, list) else [several]:
+        _check_options(file, "environment", {**environment, "weather": weather})
+    _check_options(file, "evaluation", content.get("evaluation", {}))
+
+
+def _check_options(file: Path, place: str, options: Mapping[str, Any]) -> None:
+    """Check keyword options of environments."""
+    _check(file, f"{place}.", options, {}, set(known_options(VectorOptions)) - set(_FIXED))
     try:
-        VectorOptions(**environment)
+        VectorOptions(**options)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{file}: environment: {error}") from None
+        raise ValueError(f"{file}: {place}: {error}") from None
 
 
 def _check(file: Path, place: str, given: Mapping[Any, Any], rules: Mapping[str, _Rule], known: set[str]) -> None:

@@ -187,6 +187,6 @@ def _learn(run: TrainingRun, recipe: Recipe, model: BaseAlgorithm, spent: tuple[
     flown: Flown = ([], [])
     if episodes > 0:
         policy = f"{folder}+shield" if recipe.shield else str(folder)
-        flown = evaluate_held_out(policy, worlds=episodes, options=run.options)
+        flown = evaluate_held_out(policy, worlds=episodes, options={**recipe.evaluation, **run.options})
     write_whole(run.folder / "evaluation.json", json.dumps(flown[1], indent=1) + "\n")
     return flown

@@ -51,11 +51,13 @@ class MissionMix(VecEnv):
     Args:
         missions: rows an environment id.
         options: keywords of `HydroneVectorEnv` but `autoreset_mode`, the same for all; `interface` is "egocentric",
-            for learners, unless given.
+            for learners, unless given. `weather` may be a list: the rows of each mission share its entries, as evenly
+            as they can.
         shield: whether they fly behind the shield; `INTERVENTION` is then added to the reward where it intervenes.
 
     Raises:
-        TypeError, ValueError: no missions at all, an id of another project, or an option that is refused.
+        TypeError, ValueError: no missions at all, an id of another project, an option that is refused, or a mission
+            with fewer rows than there are kinds of weather.
     """
 
     def __init__(
@@ -64,9 +66,9 @@ class MissionMix(VecEnv):
         """Make the vector environments."""
         if not missions:
             raise ValueError("missions must name at least one environment")
-        self.parts = [_made(env_id, rows, options or {}) for env_id, rows in missions.items()]
+        self.parts = [part for env_id, rows in missions.items() for part in _parts(env_id, rows, options or {})]
         self.shields = [ShieldFilter(part) for part in self.parts] if shield else []
-        *self._firsts, count = np.cumsum([0, *missions.values()]).tolist()  # row that each part begins with
+        *self._firsts, count = np.cumsum([0, *(part.num_envs for part in self.parts)]).tolist()  # first row of each
         super().__init__(count, self.parts[0].single_observation_space, self.parts[0].single_action_space)
         self._returns, self._lengths = np.zeros(count), np.zeros(count, np.int64)
         self._made_at = time.perf_counter()
@@ -158,6 +160,17 @@ class HydroneVecEnv(MissionMix):
         """Make the vector environment; raises TypeError or ValueError for an option it refuses."""
         super().__init__({env_id: num_envs}, options, shield=shield)
         self.env = self.parts[0]
+
+
+def _parts(env_id: str, rows: int, options: Mapping[str, Any]) -> list[HydroneVectorEnv]:
+    """Make the vector environments of a mission, one for each kind of weather."""
+    several = options.get("weather")
+    if not isinstance(several, list):
+        return [_made(env_id, rows, options)]
+    if not 1 <= len(several) <= rows:
+        raise ValueError(f"weather lists {len(several)} kinds for {rows} rows of {env_id}: each kind needs a row")
+    shares = np.diff(np.linspace(0, rows, len(several) + 1).astype(int)).tolist()
+    return [_made(env_id, share, {**options, "weather": each}) for share, each in zip(shares, several, strict=True)]
 
 
 def _made(env_id: str, rows: int, options: Mapping[str, Any]) -> HydroneVectorEnv:

@@ -2,6 +2,7 @@
 
     python -m benchmarks.training_seeds                      # three recipes, three seeds: two hours of one core
     python -m benchmarks.training_seeds --recipes ppo --seeds 0 1 --runs runs/seeds
+    python -m benchmarks.training_seeds --recipes ppo-weather --episodes 1000 --out runs
 
 A run that is finished in its folder, `RUNS/ppo-0` say, is not trained again, and one that was stopped goes on: several
 of these commands with other seeds can train side by side, and one more evaluates all.
@@ -19,6 +20,7 @@ import numpy as np
 import tyro
 from rich.console import Console
 
+from agents.agent import load_agent
 from agents.checkpoint import checkpoints
 from agents.recipe import load_recipe
 from agents.run_log import CHECKPOINTS, CURVE, FAILURES
@@ -27,6 +29,8 @@ from benchmarks.tables import Sheet, number
 from benchmarks.timing import RESULTS, save
 from benchmarks.world_shapes import SHAPES
 from hydrone_gym.evaluation import evaluate_held_out
+from hydrone_gym.evaluation.policies import Factory
+from planners.shield import Shield
 
 BEGINS_WITH = {"ppo-shield": "ppo"}  # recipe: the one whose weights of the same seed it goes on from
 DENSE = SHAPES["40 larger spheres"]
@@ -83,11 +87,20 @@ def effort(folder: Path) -> dict[str, float | None]:
 
 
 def flights(recipe: str, folder: Path, episodes: int) -> list[dict[str, Any]]:
-    """Evaluate an agent as it is meant to fly: behind the shield if it was trained there, then in denser worlds too."""
-    shield = load_recipe(recipe).shield
-    cells = []
-    for worlds, options in (("20 spheres", {}), *([(DENSE.name, DENSE.options)] if shield else [])):
-        _, scores = evaluate_held_out(f"{folder / 'agent'}{'+shield' * shield}", worlds=episodes, options=options)
+    """Evaluate an agent as it is meant to fly: behind the shield if it was trained there, then in denser worlds too.
+
+    One that is evaluated in weather flies alone, and behind a shield that is ready for it.
+    """
+    own, agent, cells = load_recipe(recipe), str(folder / "agent"), []
+    kinds: list[tuple[str, str | Factory, dict[str, Any]]]
+    if level := own.evaluation.get("weather"):
+        ready = f"level {level}, shield", lambda env: Shield.for_env(load_agent(agent, env), env, level=level)
+        kinds = [(*kind, own.evaluation) for kind in ((f"level {level}", agent), ready)]
+    else:
+        kinds = [("20 spheres", f"{agent}{'+shield' * own.shield}", own.evaluation)]
+        kinds += [(DENSE.name, f"{agent}+shield", DENSE.options)] if own.shield else []
+    for worlds, policy, options in kinds:
+        _, scores = evaluate_held_out(policy, worlds=episodes, options=options)
         for score in scores:
             told = {"mission": score["mission"], "outcomes": score["outcomes"], "share": score["success"]}
             cells.append({"worlds": worlds, **told})
@@ -124,8 +137,8 @@ def sheets(measured: dict[str, Any]) -> list[Sheet]:
         ("recipe", "worlds", "mission", f"seeds {seeds}, %", "mean ± deviation, %", "collisions, out, rough, diverged"),
         rows,
         [
-            f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo-shield` behind the "
-            "shield, the others alone. The last column counts flights of all seeds. "
+            f"{measured['episodes']:,} held-out worlds a mission and seed, deterministic; `ppo-shield`, and where "
+            "the worlds say so, behind the shield, else alone. The last column counts flights of all seeds. "
             f"{DENSE.name}: {DENSE.radii[0]}–{DENSE.radii[1]} m."
         ],
     )

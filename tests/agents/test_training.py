@@ -19,7 +19,7 @@ from agents.recipe import ENV_ID, FOLDER, load_recipe
 from agents.run_log import RunLog
 from agents.training import TrainingRun, resume, train
 from agents.vec_env import MissionMix
-from hydrone_gym.evaluation import HELD_OUT, MISSIONS
+from hydrone_gym.evaluation import HELD_OUT, MISSIONS, evaluate_held_out
 
 SMALL = {
     ENV_ID: {
@@ -92,6 +92,18 @@ def test_a_run_folder_is_complete(tmp_path, recipe):
     assert len(checkpoints(folder / "checkpoints")) == 2
     with pytest.raises(FileExistsError, match="holds a run already"):
         train(small_run(folder, recipe))
+
+
+def test_an_evaluation_has_options_of_its_own(tmp_path):
+    """What a recipe says of held-out worlds holds there alone; an option of the run holds in both."""
+    own = {"environment": {"weather": [0, 1]}, "evaluation": {"weather": 2, "controller": "robust", "num_obstacles": 3}}
+    recipe = written(tmp_path / "small.yml", {**SMALL, **own})
+    run = small_run(tmp_path / "run", recipe, evaluation_episodes=4, options={"num_obstacles": 6})
+    records, _ = train(run)
+    assert {record.obstacles for record in records} == {6}
+    options = {"weather": 2, "controller": "robust", "num_obstacles": 6}
+    again, _ = evaluate_held_out(str(tmp_path / "run" / "agent"), worlds=4, options=options)
+    assert all(one.same_flight(other) for one, other in zip(records, again, strict=True))
 
 
 @pytest.mark.parametrize(

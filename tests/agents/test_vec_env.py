@@ -7,8 +7,9 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-from agents.vec_env import HydroneVecEnv
+from agents.vec_env import HydroneVecEnv, MissionMix
 from hydrone_gym import Outcome
+from hydrone_gym.weather.weather import LEVELS
 
 ID = "HydroneGym/Mission-v0"
 
@@ -46,6 +47,34 @@ def test_rows_are_single_environments():
             earned[k] = 0.0
             np.testing.assert_array_equal(env.reset()[0], observation[k])
     assert ended > 3
+
+
+def test_rows_of_a_mission_share_kinds_of_weather():
+    """Parts of a mission fly a kind each; a row is the single environment in that weather, seeded as ever."""
+    rows = MissionMix({ID: 5, "HydroneGym/AirToWater-v0": 2}, {"weather": [0, 3], "controller": "robust"})
+    assert [(part.num_envs, part.options.the_weather) for part in rows.parts] == [
+        (2, LEVELS[0]),
+        (3, LEVELS[3]),
+        (1, LEVELS[0]),
+        (1, LEVELS[3]),
+    ]
+    assert {part.options.controller for part in rows.parts} == {"robust"}
+    rows.seed(11)
+    rows.reset()
+    env = gym.make(ID, interface="egocentric", weather=3, controller="robust")
+    env.reset(seed=11 + 4)
+    rng = np.random.default_rng(0)
+    for _ in range(6):
+        actions = random_actions(rng, 7)
+        np.testing.assert_array_equal(rows.step(actions)[0][4], env.step(actions[4])[0])
+
+
+@pytest.mark.parametrize("weather", [[], [0, 1, 2]])
+def test_every_kind_of_weather_needs_a_row(weather):
+    with pytest.raises(
+        ValueError, match=f"weather lists {len(weather)} kinds for 2 rows of {ID}: each kind needs a row"
+    ):
+        MissionMix({ID: 2}, {"weather": weather})
 
 
 def test_a_time_out_is_a_truncation():

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import yaml
 
+from agents import load_agent
 from agents import recipe as recipes
 from agents.run_log import COLUMNS
 from benchmarks.training_seeds import DENSE, Arguments, effort, measure, sheets, trained
 from hydrone_gym.evaluation import MISSIONS, evaluate_held_out
+from planners.shield import Shield
 
 SMALL = {
     recipes.ENV_ID: {
@@ -30,6 +32,8 @@ def small_recipes(tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "ppo.yml").write_text(yaml.safe_dump(SMALL))
     (folder / "ppo-shield.yml").write_text(yaml.safe_dump({**SMALL, "shield": True}))
+    weather = {"environment": {"weather": [0, 2]}, "evaluation": {"weather": 2, "controller": "robust"}}
+    (folder / "ppo-weather.yml").write_text(yaml.safe_dump({**SMALL, **weather}))
     monkeypatch.setattr(recipes, "FOLDER", folder)
 
 
@@ -49,6 +53,18 @@ def test_runs_are_trained_once_and_evaluated_as_they_are_meant_to_fly(tmp_path):
     written = {path: path.stat().st_mtime_ns for path in runs.rglob("*") if path.is_file()}
     assert trained("ppo-shield", 3, runs) == runs / "ppo-shield-3"
     assert written == {path: path.stat().st_mtime_ns for path in runs.rglob("*") if path.is_file()}
+
+
+@pytest.mark.usefixtures("small_recipes")
+def test_what_learnt_in_weather_flies_in_it_alone_and_shielded(tmp_path):
+    (run,) = measure(Arguments(recipes=("ppo-weather",), seeds=(3,), runs=tmp_path, episodes=6))["runs"]
+    assert [c["worlds"] for c in run["flights"]] == ["level 2"] * 3 + ["level 2, shield"] * 3
+    agent, options = tmp_path / "ppo-weather-3" / "agent", {"weather": 2, "controller": "robust"}
+    _, alone = evaluate_held_out(str(agent), worlds=6, options=options)
+    _, ready = evaluate_held_out(
+        lambda env: Shield.for_env(load_agent(agent, env), env, level=2), worlds=6, options=options
+    )
+    assert [c["outcomes"] for c in run["flights"]] == [score["outcomes"] for score in [*alone, *ready]]
 
 
 def test_effort(tmp_path):

@@ -14,6 +14,7 @@ from agents.agent import PRETRAINED
 from hydrone_gym.evaluation import DEFAULT_POLICIES, known_policies
 from hydrone_gym.evaluation.policies import find_policies, find_policy
 from planners import CLRRT, MPPI, OpenLoopRRT, PotentialField, PublishedCLRRT, StraightLine
+from planners.caution import caution_at
 from planners.shield import Shield
 
 SOURCE = """
@@ -45,6 +46,8 @@ KINDS = {
     "open-loop-rrt": OpenLoopRRT,
     "ppo": Agent,
     "ppo-shield": Shield,
+    "ppo-weather": Agent,
+    "ppo-weather-shield": Shield,
 }
 
 
@@ -72,6 +75,13 @@ def test_every_registered_name_makes_its_policy_for_the_environment(env):
     assert shielded.policy.file.name == "ppo-shield"
     assert shielded.simulation.vehicle == env.unwrapped.vehicle
     assert type(find_policy("straight-line-shield").make(env, 0).policy) is StraightLine
+
+
+def test_a_shield_for_weather_is_ready_for_the_level_of_its_environment():
+    for level in (0, 2):
+        shielded = find_policy("ppo-weather-shield").make(gym.make("HydroneGym/Mission-v0", weather=level), 0)
+        assert shielded.caution == caution_at(level)
+        assert shielded.policy.file.name == "ppo-weather"
 
 
 @pytest.mark.parametrize("text", ["my_policies:Still", "my_policies.py:Still", "my_policies:Maker.made"])
