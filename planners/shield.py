@@ -12,8 +12,8 @@ hovering vehicle through a wall. So under water the hover verified last is verif
 the vehicle retreats: it turns and swims a metre against its drift. A verified retreat is held like a hover.
 
 A policy without memory may ask for ever for what is refused, under a sphere that hangs just above the surface say. So
-a vehicle that was refused something in `PATIENCE` periods at one place is sent aside for `ASIDE` periods, each time in
-another direction, checked like any other reference; from there the policy tries again.
+a vehicle that was refused something for some periods at one place is sent aside for a while, each time in another
+direction, checked like any other reference; from there the policy tries again.
 """
 
 from collections.abc import Mapping
@@ -28,21 +28,15 @@ from hydrone_gym.simulation.rollout import Rollout
 from hydrone_gym.simulation.storage import VESSEL, new_rows
 from hydrone_gym.surface import in_air
 from hydrone_gym.world.bodies import NOWHERE
+from planners.aside import beside, watch
 from planners.belief import Belief, belief_of
 from planners.caution import caution_for
-from planners.check import AIR_GATE, WATER_GATE
 from planners.disturbance import Estimator, Sight
 from planners.guard import GuardQuery, guard
 from planners.policy import KEYS, Known, known
 from planners.stop_check import HELD, RETREAT
 
 __all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
-
-PATIENCE = 7  # refusals within `_PLACE` of one place after which the vehicle is sent aside
-ASIDE = 14  # periods that a step aside lasts: down out of the zone and then some
-_PLACE = 0.5  # m
-_STEP_ASIDE = 2.0  # m
-_TURN = np.pi * (3.0 - np.sqrt(5.0))  # rad, the golden angle: directions tried one after another spread evenly
 
 
 def _candidates() -> NDArray[np.float64]:
@@ -164,9 +158,9 @@ class Shield:
         action, inner = self.policy.predict(seen, state.policy, episode_start, deterministic)
         proposed = np.atleast_2d(np.asarray(action, np.float64))
         held = np.where(starts[:, None], in_force, state.held)
-        place, stayed, detours = _watch(here, starts, state)
+        place, stayed, detours = watch(here, starts, state.choice != 0, state.place, state.stayed, state.detours)
         aside = stayed < 0
-        proposed = np.where(aside[:, None], _beside(place, in_force, detours), proposed)
+        proposed = np.where(aside[:, None], beside(place, in_force, detours), proposed)
         proposed = self._turned(proposed, here, np.reshape(seen["goal"], (count, 3)))
         sent, held, choice = self.check(seen, proposed, held, eyes=here, sights=sights)
         interventions = np.where(starts, 0, state.interventions) + ((choice != 0) | aside)
@@ -280,34 +274,3 @@ def _each(observation: Mapping[str, NDArray]) -> list[Known]:
     """Return what is known in each environment of an observation, single or batched."""
     single = np.ndim(observation["state"]) == 1
     return [known(observation, None if single else k) for k in range(1 if single else len(observation["state"]))]
-
-
-def _watch(
-    positions: NDArray[np.float64], starts: NDArray[np.bool_], state: ShieldState
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the new `place`, `stayed` and `detours`: a vehicle that has waited too long begins a step aside."""
-    aside = (state.stayed < 0) & ~starts
-    left = starts | (~aside & (np.linalg.norm(positions - state.place, axis=1) > _PLACE))
-    stayed = np.where(left, 0, state.stayed + (aside | (state.choice != 0)))
-    begins = stayed >= PATIENCE
-    detours = np.where(starts, 0, state.detours) + begins
-    ended = aside & (stayed == 0)
-    place = np.where((left | begins | ended)[:, None], positions, state.place)
-    return place, np.where(begins, -ASIDE, stayed), detours
-
-
-def _beside(
-    place: NDArray[np.float64], in_force: NDArray[np.float64], detours: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return references (n, 4) beside a place, in a direction that each detour turns.
-
-    They lie outside the transition zone: from inside it the first detour leads below, the next one above.
-    """
-    angle = _TURN * detours
-    beside = in_force.astype(np.float64)
-    beside[:, 0] = place[:, 0] + _STEP_ASIDE * np.cos(angle)
-    beside[:, 1] = place[:, 1] + _STEP_ASIDE * np.sin(angle)
-    between = np.abs(place[:, 2]) < min(AIR_GATE, WATER_GATE)
-    air = np.where(between, detours % 2 == 0, in_air(place[:, 2]))
-    beside[:, 2] = np.where(air, np.maximum(place[:, 2], AIR_GATE), np.minimum(place[:, 2], -WATER_GATE))
-    return beside

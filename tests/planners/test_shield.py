@@ -135,7 +135,7 @@ def test_a_step_aside_leads_out_of_a_pocket(monkeypatch):
     outcome, state = fly_under_a_lid(env, Shield.for_env(Straight(), env))
     assert outcome is Outcome.GOAL
     assert state.detours[0] > 0
-    monkeypatch.setattr("planners.shield.PATIENCE", 10_000)
+    monkeypatch.setattr("planners.aside.PATIENCE", 10_000)
     outcome, state = fly_under_a_lid(env, Shield.for_env(Straight(), env))
     assert outcome is Outcome.TIMEOUT
     assert state.detours[0] == 0
