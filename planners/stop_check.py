@@ -42,7 +42,7 @@ _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift
 _OBLIQUELY = ((1.9, 0.35), (1.9, -0.35), (-1.9, 0.35), (-1.9, -0.35))  # m ahead or astern, rad off the bow
 _SMOOTH = 0.5  # share of a rough crossing's speed that one may have in weather, where waves add to it
 _RISING = 0.12  # m/s through the water that a vehicle may have sideways when it begins to rise out of it
-_COMMITTED = 0.4  # m from the surface: nearer, a crossing goes on
+COMMITTED = 0.4  # m from the surface: nearer, a crossing goes on
 _REST = 0.03  # m/s: slower than this is rest, but for the drift under water
 _LEVEL = 0.02  # rad and rad/s: who is tilted more stands still for a moment only
 _DRIFT = 12.0  # s: sway is unactuated in water, so what is left of it at the end of a stop goes on for a while
@@ -183,7 +183,7 @@ def can_stop(check, vessel, after):
 def _nears_surface(check, vessel, end):
     """Whether a vehicle goes on toward the surface inside the transition zone, and need not yet."""
     z, to_z = state_of(vessel).z, state_of(end).z
-    return abs(z) > _COMMITTED and abs(to_z) < check.world.zone and abs(to_z) < abs(z)
+    return abs(z) > COMMITTED and abs(to_z) < check.world.zone and abs(to_z) < abs(z)
 
 
 @inlined
@@ -207,13 +207,25 @@ def verify(check, vessel, reference):
     return can_stop(check, end, check.period)
 
 
+@inlined
+def dips(check, vessel, hover):
+    """Return the hover of a vehicle in air; in weather, of one that is already at the surface on its way down, below.
+
+    Whether that one is smooth is not asked: waves decide that by now, and who turns back is carried about by them.
+    """
+    s = state_of(vessel)
+    down = check.lane.weathered > 0 and is_air(s.z) and s.z < COMMITTED and not is_air(check.goal.z)
+    return (hover[0], hover[1], -WATER_GATE if down else hover[2], hover[3])
+
+
 @routine
 def _held_in_air(check, vessel, held):
     """Return what a vehicle goes on with that is in air, or on its way there: what it holds, or a hover where it is.
 
     What was verified for a vehicle that comes out of the water somewhere may be the wrong thing where it came out.
     """
-    if not is_air(state_of(vessel).z):
+    s = state_of(vessel)
+    if not is_air(s.z) or (s.z < COMMITTED and s.vz <= 0.0 and not is_air(held[2])):
         return held
     if state_of(vessel).vz > 0.0 and not is_air(held[2]):  # it has come out
         hovers, hover = can_hover(check, vessel, 0.0)

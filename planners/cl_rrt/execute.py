@@ -35,7 +35,7 @@ from planners.cl_rrt.objective import ObjectiveParams
 from planners.cl_rrt.settings import SettingParams
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, ROOT, Planner, node_state, prune_orphans, reroot
 from planners.clearance import clearance_between
-from planners.stop_check import can_hover, follow, goes_on
+from planners.stop_check import can_hover, dips, follow, goes_on
 from planners.tube import NO_TUBE
 
 _BEND = 0.1  # m: how far an edge may leave its chord
@@ -209,7 +209,7 @@ def verify_stop(p, first):
         after += p.check.period
         safe, hover = can_hover(p.check, end, after)
     if not safe and stays:
-        count, safe, hover = 0, True, back
+        count, safe, hover = 0, True, dips(p.check, vessel, back) if p.nodes[first].kind == CROSSING else back
     back_up(p, count, hover)
     return count + 1 if safe else 0
 
