@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import gymnasium as gym
 import tyro
 from rich.console import Console
 
+from agents import load_agent
 from benchmarks.timing import RESULTS, save
 from hydrone_gym import Spread, Weather
 from hydrone_gym.evaluation import fly_worlds
@@ -26,6 +28,8 @@ from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.evaluation.suites import HELD_OUT
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.weather.weather import ROTOR_DRAG
+from planners import CLRRT, Shield
+from planners.named import level_of
 
 POLICIES = ("clrrt", "clrrt-weather", "ppo-shield", "ppo-shield-weather")
 EXPERIMENTS = {"air to water": "HydroneGym/AirToWater-v0", "water to air": "HydroneGym/WaterToAir-v0"}
@@ -50,12 +54,24 @@ class Arguments:
     """Kinds of weather by name."""
     policies: tuple[str, ...] = POLICIES
     """Policies, named as for `hydrone evaluate`."""
+    promises: tuple[float, ...] = ()
+    """Shares of flights that CL-RRT, and PPO behind the shield, promise besides."""
     controller: str = "paper"
     """Control law."""
     seed: int = HELD_OUT
     """Seed of the first world."""
     out: Path = RESULTS
     """Folder of weather_factors.json."""
+
+
+def promising(env: Any, promise: float) -> CLRRT:
+    """Return CL-RRT that keeps a promise at an environment's level of weather."""
+    return CLRRT.for_env(env, level=level_of(env), promise=promise)
+
+
+def promising_shield(env: Any, promise: float) -> Shield:
+    """Return PPO behind a shield that does."""
+    return Shield.for_env(load_agent("ppo-shield", env), env, level=level_of(env), promise=promise)
 
 
 def cell(factor: str, source: PolicySource, mission: str, a: Arguments) -> dict[str, Any]:
@@ -85,6 +101,10 @@ def measure(a: Arguments) -> dict[str, Any]:
     if a.worlds < 1:
         raise ValueError(f"worlds must be at least 1, got {a.worlds}")
     sources, console, cells, began = find_policies(a.policies), Console(stderr=True), [], time.process_time()
+    for promise in a.promises:
+        kinds = {"clrrt": promising, "ppo-shield": promising_shield}
+        made = {f"{name}-promise-{promise:g}": partial(kind, promise=promise) for name, kind in kinds.items()}
+        sources += find_policies(made)
     for factor in a.factors:
         for source in sources:
             cells += [cell(factor, source, mission, a) for mission in EXPERIMENTS]
