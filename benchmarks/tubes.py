@@ -40,7 +40,7 @@ from planners.tube import FILE, PLACES, Tube, key_of, tube_of
 
 Flight = tuple[NDArray[np.int64], NDArray[np.float64]]
 _SHAPE = 0.99  # quantile of the deviations that makes the shape
-_LEAST = 0.02  # m: smaller deviations are not told apart
+_LEAST = 0.05  # m: smaller deviations do not matter
 _LONGEST = 40  # looks of a flight
 SEED = 20_000_000  # of the flights that tubes are made from
 _BLOCK = 50  # flights that a process flies in one go

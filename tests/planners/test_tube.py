@@ -77,8 +77,7 @@ def test_stops_keep_the_tube():
     observation["state"][:], observation["integral"][:] = (0, 0, 5, *np.zeros(9)), 0.0
     observation["reference"][:] = (0, 0, 5, 0)
     shields = {p: Shield.for_env(None, env, level=2, promise=p) for p in (None, 0.9)}
-    width = shields[0.9].caution.tube[0, 2]  # in air it is widest after a second and a half
-    assert width == shields[0.9].caution.tube[0].max()
+    width = shields[0.9].caution.tube[0].max()
     assert shields[0.9].caution.margin == MARGIN
     step = np.array([[0.3, 0.0, 5.0, 0.0]])
     verdicts = {}
