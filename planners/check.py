@@ -148,13 +148,17 @@ def sensed(check, vessel):
 
 
 @inlined
-def room_to_cross(check, x, y, share):
-    """Whether a vertical path through the zone clears every known obstacle and wall, by a share of the drift."""
+def near_walls(check, x, y, share):
+    """Whether a current could carry a vehicle that crosses somewhere into a wall before it swims, or while it rises."""
     w, away = check.world, share * check.drift
-    if x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away:
-        return False
+    return x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away
+
+
+@inlined
+def room_to_cross(check, x, y):
+    """Whether a vertical path through the zone keeps away from walls and from every known obstacle."""
     near = clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), check.lane, 0, check.radius)
-    return near >= check.margin + OF_DRIFT * away
+    return near >= check.margin + OF_DRIFT * check.drift and not near_walls(check, x, y, 1.0)
 
 
 @inlined

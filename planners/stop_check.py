@@ -201,7 +201,7 @@ def verify(check, vessel, reference):
     safe, arrives, _ = follow(check, vessel, end, reference, 0.0)
     if safe and check.lane.weathered > 0 and _nears_surface(check, vessel, end):
         s = state_of(end)
-        safe = room_to_cross(check, s.x, s.y, 1.0) and (is_air(s.z) or _sideways(check, s) < _RISING)
+        safe = room_to_cross(check, s.x, s.y) and (is_air(s.z) or _sideways(check, s) < _RISING)
     if arrives or not safe:
         return safe, hover_reference(check, end)
     return can_stop(check, end, check.period)

@@ -13,7 +13,7 @@ from hydrone_gym.control.reference import clamp
 from hydrone_gym.physics.trigonometry import arctan, wrap
 from hydrone_gym.simulation.storage import REFERENCE, Point, Pose
 from hydrone_gym.surface import is_air
-from planners.check import AIR_GATE, OF_DRIFT, WATER_GATE, inside
+from planners.check import AIR_GATE, OF_DRIFT, WATER_GATE, inside, near_walls
 from planners.cl_rrt.edge import ARRIVED, BLOCKED, adopt, zone_edge
 from planners.cl_rrt.printed import CROSS_LIMIT, SETTLE_LIMIT, cross_as_printed
 from planners.cl_rrt.references import air_reference, water_reference
@@ -68,13 +68,6 @@ def column_is_free(p, x, y, down):
     """Whether a vertical path through the zone clears every known obstacle, and a drift into the water most of it."""
     room = p.margin + (OF_DRIFT * p.settings.drift if down else 0.0)
     return clearance_between((x, y, AIR_GATE), (x, y, -WATER_GATE), p.check.lane, 0, p.check.radius) >= room
-
-
-@inlined
-def near_wall(p, x, y, share):
-    """Whether a current could carry a vehicle from a column into a wall before it swims, or while it rises."""
-    w, away = p.check.world, share * p.settings.drift
-    return x - w.x_min < away or w.x_max - x < away or y - w.y_min < away or w.y_max - y < away
 
 
 @inlined
@@ -231,7 +224,7 @@ def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     s, down = node_state(p, source), is_air(node_state(p, source).z)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1], down) or near_wall(p, column[0], column[1], 1.0):
+    if not column_is_free(p, column[0], column[1], down) or near_walls(p.check, column[0], column[1], 1.0):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)

@@ -22,13 +22,13 @@ from planners.check import (
     Check,
     clearance_left,
     copy_vessel,
+    near_walls,
     place_of,
     reference_of,
     sensed,
     state_of,
     wall_near,
 )
-from planners.cl_rrt.crossing import near_wall
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
 from planners.cl_rrt.objective import ObjectiveParams
@@ -160,7 +160,7 @@ def re_propagate(p, end):
             return -i
         if n.parent == ROOT and n.kind == CROSSING and p.nodes[ROOT].kind != CROSSING:
             s = node_state(p, ROOT)
-            if near_wall(p, s.x, s.y, _CARRIED_TO):
+            if near_walls(p.check, s.x, s.y, _CARRIED_TO):
                 return -i
         adopt(p, n.parent, i, n.kind, ended, flown)
         n.next, n.unsafe, n.tried = kept_next, kept_unsafe, kept_tried
