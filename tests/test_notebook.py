@@ -34,6 +34,7 @@ def test_it_runs_with_few_worlds(notebook, tmp_path, monkeypatch):
     notebook.cells.remove(install)
     (worlds,) = [cell for cell in notebook.cells if cell.source.startswith("WORLDS = ")]
     worlds.source = "WORLDS = 1"
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # else the kernel shows no figures
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
     resources = {"metadata": {"path": str(tmp_path)}}
     client = NotebookClient(notebook, timeout=480, resources=resources, km=kernel_of_this_interpreter())
