@@ -227,13 +227,10 @@ def _held_in_air(check, vessel, held):
     s = state_of(vessel)
     if not is_air(s.z) or (s.z < COMMITTED and s.vz <= 0.0 and not is_air(held[2])):
         return held
-    if state_of(vessel).vz > 0.0 and not is_air(held[2]):  # it has come out
-        hovers, hover = can_hover(check, vessel, 0.0)
-        if hovers:
-            return hover
+    came_out = s.vz > 0.0 and not is_air(held[2])
     spare = shifted(check.scratch, VESSEL)
     copy_vessel(vessel, spare)
-    if rests(check, spare, held, LOOK_AHEAD, 0.0):
+    if not came_out and rests(check, spare, held, LOOK_AHEAD, 0.0):
         return held
     hovers, hover = can_hover(check, vessel, 0.0)
     return hover if hovers else held
@@ -249,10 +246,10 @@ def goes_on(check, vessel, held):
     not called back: at the surface current and waves carry it along.
     """
     s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
-    if check.lane.weathered == 0 and is_air(s.z):
-        return HELD, held
-    if is_air(held[2]) or is_air(s.z):
+    if check.lane.weathered > 0 and (is_air(s.z) or is_air(held[2])):
         return HELD, _held_in_air(check, vessel, held)
+    if is_air(s.z):
+        return HELD, held
     copy_vessel(vessel, spare)
     if rests(check, spare, held, _RETREAT_AHEAD, 0.0):
         return HELD, held

@@ -127,6 +127,15 @@ class Hover:
         return np.float32(observation["reference"]), None
 
 
+def test_in_still_weather_a_way_out_of_the_water_that_is_held_is_verified_again():
+    """Held is a place in air, and a sphere that has come into sight hangs in the way: the vehicle swims off instead."""
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=1)
+    observation = drifting(env, -0.004)
+    observation["obstacles"] = np.array([[0.0, -9.9, -1.0, 0.5]])
+    held = np.array([[0.0, -9.9, AIR_GATE, 0.0]])
+    assert Shield.for_env(None, env).check(observation, held, held)[2].tolist() == [RETREAT]
+
+
 def test_in_wind_a_vehicle_that_leans_is_at_rest():
     _, shield, observation, sights = settled(4.0, 16)
     assert np.linalg.norm(observation["state"][3:5]) > 0.03  # more than what is level in still weather
