@@ -22,6 +22,7 @@ from hydrone_gym.weather.waves import sea_params, wave_number
 from hydrone_gym.weather.weather import DEPTH, LEVELS, ROTOR_DRAG
 from hydrone_gym.weather.wind import dryden
 from hydrone_gym.world.world import World
+from planners import refusal
 
 WORLD = World()
 STRONG = 2.0  # standard deviations above the mean
@@ -44,10 +45,9 @@ def currents(weather: Weather) -> Pair:
 
 def holding_tilt(wind: float, rotor_drag: float = ROTOR_DRAG, vehicle: Vehicle = HYDRONE) -> float:
     """Tilt (rad) whose lateral lift balances the drag of rotors at hover and of the hull in a wind (m/s)."""
-    nominal, hull = vehicle_params(vehicle), hull_of(vehicle)._replace(rotor_drag=rotor_drag)
+    hull = hull_of(vehicle)._replace(rotor_drag=rotor_drag)
     rotors = 4.0 * unmodelled_of(hull, _STEP).rotor_drag * vehicle.hover_speed * wind
-    body = nominal.air.drag_x / nominal.air.inverse_mass * wind * wind
-    return math.atan((rotors + body) / nominal.air.weight)
+    return refusal.holding_tilt(vehicle, wind, rotors)
 
 
 def full_thrust(vehicle: Vehicle) -> float:

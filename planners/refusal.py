@@ -9,9 +9,16 @@ import math
 from hydrone_gym.physics.parameters import vehicle_params
 from hydrone_gym.simulation.conditions import Steady
 from hydrone_gym.surface import in_air
+from hydrone_gym.vehicle import Vehicle
 from planners.belief import Belief
 from planners.caution import Caution
 from planners.disturbance import Sight
+
+
+def holding_tilt(vehicle: Vehicle, wind: float, rotors: float = 0.0) -> float:
+    """Tilt (rad) whose lateral lift balances the drag of the hull in a wind (m/s), and a drag of rotors (N)."""
+    air = vehicle_params(vehicle).air
+    return math.atan((rotors + air.drag_x / air.inverse_mass * wind * wind) / air.weight)
 
 
 def refusal(belief: Belief, caution: Caution, sight: Sight | None, goal_height: float) -> str | None:
@@ -25,7 +32,7 @@ def refusal(belief: Belief, caution: Caution, sight: Sight | None, goal_height: 
     """
     if sight is None:
         return None
-    found, air = Steady(*sight.estimate), vehicle_params(belief.vehicle).air
+    found = Steady(*sight.estimate)
     wind, current = math.hypot(found.wind_x, found.wind_y), math.hypot(found.water_x, found.water_y)
     if not in_air(sight.state[2]):
         fastest = belief.envelope.surge
@@ -36,7 +43,7 @@ def refusal(belief: Belief, caution: Caution, sight: Sight | None, goal_height: 
         )
     if in_air(goal_height):
         return None
-    tilt = math.atan(air.drag_x / air.inverse_mass * wind * wind / air.weight)
+    tilt = holding_tilt(belief.vehicle, wind)
     if tilt > caution.crossing_tilt:
         allowed = f"{math.degrees(caution.crossing_tilt):.1f} degrees of tilt"
         return f"cannot keep still at the surface: {wind:.1f} m/s of wind take {math.degrees(tilt):.1f}, not {allowed}"
