@@ -12,6 +12,7 @@ from planners.check import MARGIN
 from planners.tube import NO_TUBE, tube_of
 
 _TAKEN = 5.0  # s to be through the zone and get away from what a current pushes to
+_TURNED = 2.5  # s to be turned so far that thrust takes effect: who is nearer to a wall may be carried into it
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
 
 
@@ -37,9 +38,9 @@ def caution_at(level: Any) -> Caution:
         raise ValueError(f"level must be a whole number from 0 to {len(LEVELS) - 1}, got {level!r}")
     if level == 0:
         return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.0)
-    share = level / _TUNED
-    margins = (MARGIN + 0.1 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share, 0.15 * share)
-    return Caution(*margins, 0.15, math.radians(4.5), LEVELS[level].current * _TAKEN)
+    share, current = level / _TUNED, LEVELS[level].current
+    margins = (MARGIN + 0.15 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share)
+    return Caution(*margins, _TURNED * current, 0.15, math.radians(4.5), _TAKEN * current)
 
 
 def caution_for(belief: Belief, level: Any, promise: float | None = None) -> Caution:

@@ -20,7 +20,6 @@ MARGIN = 0.05  # m of clearance that a stop keeps: what an estimate of the posit
 GIVE = 0.002  # m: how much nearer than now a vehicle within the margin may come; more would add up
 LEAST_MARGIN = 0.005  # m
 _WALL = 0.1  # m: references keep this far inside the box
-_NEARER = 0.5  # share of its distance from the walls that a vehicle near one may use up
 TUBE_STEP = 0.5  # s
 TUBE_LENGTH = 14  # steps: a period, the stop after it, and latency
 
@@ -76,7 +75,7 @@ def margin_after(check, seconds):
 
 
 @inlined
-def _from_walls(w, s):
+def from_walls(w, s):
     """Distance (m) of a place from the nearest wall."""
     across = min(min(s.x - w.x_min, w.x_max - s.x), min(s.y - w.y_min, w.y_max - s.y))
     return min(across, min(s.z - w.z_min, w.z_max - s.z))
@@ -87,13 +86,13 @@ def keeps_room(check, vessel):
     """Whether a vehicle keeps its distance from the walls; in still weather that is for the outcome to say."""
     if check.lane.weathered == 0:
         return True
-    return _from_walls(check.world, state_of(vessel)) >= min(check.room, check.wall)
+    return from_walls(check.world, state_of(vessel)) >= min(check.room, check.wall)
 
 
 @inlined
 def wall_near(vessel, world):
-    """How near to the walls (m) a vehicle may come, whatever it should keep: who is near must be free to move."""
-    return _NEARER * _from_walls(world, state_of(vessel))
+    """How near to the walls (m) a vehicle may come, whatever it should keep: not nearer than it is."""
+    return from_walls(world, state_of(vessel))
 
 
 @inlined

@@ -14,7 +14,8 @@ from hydrone_gym.simulation.rollout import lane_of, of_row
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.world.bodies import BODY, segment_distance
 from planners.check import Check, clearance_left, inside, place_of, single, state_of, wall_near
-from planners.stop_check import HELD, goes_on, verify
+from planners.hold import HELD, crosses, goes_on
+from planners.stop_check import verify
 
 _NEAR = 5.0  # m: spheres whose surface is farther are out of reach of a period, a stop and the drift after it
 
@@ -102,9 +103,13 @@ def guard(query, rollout, envelope, candidates, scratch):
         goal, eye = view(row.goal, 0, Point), view(query.eyes[n], 0, Point)
         around = (lane, goal, eye, world, limits, radius)
         check = Check(*around, *margins, tube, query.since, period, pointer(scratch))
-        query.choice[n], reference, hover = _first_safe(check, vessel, query.proposed[n], candidates)
-        if query.choice[n] == HELD:
-            query.choice[n], reference = goes_on(check, vessel, _four(query.held[n]))
+        held = _four(query.held[n])
+        choice, reference, hover = HELD, held, held
+        if not crosses(check, vessel, held):
+            choice, reference, hover = _first_safe(check, vessel, query.proposed[n], candidates)
+        if choice == HELD:
+            choice, reference = goes_on(check, vessel, held)
             hover = reference
+        query.choice[n] = choice
         scatter(query.sent[n], 0, 0, 1, Pose(reference[0], reference[1], reference[2], reference[3]))
         scatter(query.held[n], 0, 0, 1, Pose(hover[0], hover[1], hover[2], hover[3]))

@@ -33,8 +33,8 @@ from planners.belief import Belief, belief_of
 from planners.caution import caution_for
 from planners.disturbance import Estimator, Sight
 from planners.guard import GuardQuery, guard
+from planners.hold import HELD, RETREAT
 from planners.policy import KEYS, Known, known
-from planners.stop_check import HELD, RETREAT
 
 __all__ = ["CANDIDATES", "HELD", "RETREAT", "Shield", "ShieldState"]
 

@@ -2,9 +2,10 @@
 
 CL-RRT, the shield, and training behind the shield ask here, with one set of constants. A stop is verified when the
 vehicle comes to rest: slow, level, outside the transition zone, and under water not carried into anything by what is
-left of its sway. Rest under water does not last, so what is held is verified again, and given up for a retreat when it
-is not safe any more.
+left of its sway. What a vehicle goes on with when nothing is verified is in `planners.hold`.
 """
+
+import math
 
 import numpy as np
 
@@ -21,8 +22,8 @@ from planners.check import (
     AIR_GATE,
     WATER_GATE,
     Check,
-    careless,
     copy_vessel,
+    from_walls,
     inside,
     keeps_room,
     margin_after,
@@ -33,13 +34,9 @@ from planners.check import (
 )
 from planners.clearance import clearance_between
 
-HELD = -1  # what was verified last goes on
-RETREAT = -2  # nor is that safe any more: the vehicle turns under water and swims against its drift
 LOOK_AHEAD = 6.0  # s that a stop is simulated for: from 2 m/s in air it takes 4.5, out of the water 5.5
-_RETREAT_AHEAD = 10.0  # s that a retreat is simulated for: a quarter turn takes five
-_RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
-_TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
-_OBLIQUELY = ((1.9, 0.35), (1.9, -0.35), (-1.9, 0.35), (-1.9, -0.35))  # m ahead or astern, rad off the bow
+_OBLIQUELY = tuple((along, turn) for turn in (0.35, -0.35, 0.8, -0.8) for along in (1.9, -1.9))  # m, rad off the bow
+_BETTER = 0.1  # m farther from the walls: worth a change of mind
 _SMOOTH = 0.5  # share of a rough crossing's speed that one may have in weather, where waves add to it
 _RISING = 0.12  # m/s through the water that a vehicle may have sideways when it begins to rise out of it
 COMMITTED = 0.4  # m from the surface: nearer, a crossing goes on
@@ -127,22 +124,36 @@ def rests(check, vessel, hover, seconds, after):
     return near >= margin_after(check, after)
 
 
-@routine
-def _gets_away(check, vessel, seconds, after):
-    """Return (whether a vessel in a current gets away ahead or astern, the reference); the vessel stays as it is.
+@inlined
+def _room_at(check, vessel):
+    """Distance (m) of a vehicle from the nearest wall or known obstacle."""
+    s = state_of(vessel)
+    clearance = clearance_between((s.x, s.y, s.z), (s.x, s.y, s.z), check.lane, 0, check.radius)
+    return min(clearance, from_walls(check.world, s) - check.radius)
 
-    Who turns against a current first is carried along meanwhile; obliquely to it full thrust takes effect at once.
+
+@routine
+def gets_away(check, vessel, held, seconds, after):
+    """Return (whether a vessel in a current gets away from where it is, the reference); the vessel stays as it is.
+
+    Who turns against a current first is carried along meanwhile; obliquely to it full thrust takes effect at once. Of
+    the ways that are safe it takes the one that ends farthest from everything, and the one it is on if none is better
+    by much: who changes its mind stays where it is.
     """
     s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
-    away = single(s.x, s.y, s.z, s.psi)
+    best, farthest = held, -math.inf
+    copy_vessel(vessel, spare)
+    if rests(check, spare, held, seconds, after):
+        farthest = _room_at(check, spare) + _BETTER
     for along, turn in _OBLIQUELY:
         sine, cosine = sincos(s.psi + turn)
         x, y, z = inside(check, s.x + along * cosine, s.y + along * sine, min(s.z, -WATER_GATE))
         away = single(x, y, z, s.psi)
         copy_vessel(vessel, spare)
         if rests(check, spare, away, seconds, after):
-            return True, away
-    return False, away
+            room = _room_at(check, spare)
+            best, farthest = (away, room) if room > farthest else (best, farthest)
+    return farthest > -math.inf, best
 
 
 @routine
@@ -153,7 +164,7 @@ def can_hover(check, vessel, after):
     if rests(check, spare, hover, LOOK_AHEAD, after):
         return True, hover
     if check.lane.weathered > 0 and not is_air(state_of(vessel).z):
-        return _gets_away(check, vessel, LOOK_AHEAD, after)
+        return gets_away(check, vessel, hover, LOOK_AHEAD, after)
     return False, hover
 
 
@@ -207,67 +218,4 @@ def verify(check, vessel, reference):
     return can_stop(check, end, check.period)
 
 
-@inlined
-def dips(check, vessel, hover):
-    """Return the hover of a vehicle in air; in weather, of one that is already at the surface on its way down, below.
-
-    Whether that one is smooth is not asked: waves decide that by now, and who turns back is carried about by them.
-    """
-    s = state_of(vessel)
-    down = check.lane.weathered > 0 and is_air(s.z) and s.z < COMMITTED and not is_air(check.goal.z)
-    return (hover[0], hover[1], -WATER_GATE if down else hover[2], hover[3])
-
-
-@routine
-def _held_in_air(check, vessel, held):
-    """Return what a vehicle goes on with that is in air, or on its way there: what it holds, or a hover where it is.
-
-    What was verified for a vehicle that comes out of the water somewhere may be the wrong thing where it came out.
-    """
-    s = state_of(vessel)
-    if not is_air(s.z) or (s.z < COMMITTED and s.vz <= 0.0 and not is_air(held[2])):
-        return held
-    came_out = s.vz > 0.0 and not is_air(held[2])
-    spare = shifted(check.scratch, VESSEL)
-    copy_vessel(vessel, spare)
-    if not came_out and rests(check, spare, held, LOOK_AHEAD, 0.0):
-        return held
-    hovers, hover = can_hover(check, vessel, 0.0)
-    return hover if hovers else held
-
-
-@routine
-def goes_on(check, vessel, held):
-    """Return (HELD or RETREAT, the reference to go on with) for a vehicle that holds a reference.
-
-    Under water a hover drifts, so what was safe when it was verified may no longer be; then the vehicle swims against
-    the drift, as nearly as is free, in a current also obliquely to it, ahead or astern, which needs no turn first.
-    While it turns it may come nearer to spheres than the margin. In weather who has begun to rise out of the water is
-    not called back: at the surface current and waves carry it along.
-    """
-    s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
-    if check.lane.weathered > 0 and (is_air(s.z) or is_air(held[2])):
-        return HELD, _held_in_air(check, vessel, held)
-    if is_air(s.z):
-        return HELD, held
-    copy_vessel(vessel, spare)
-    if rests(check, spare, held, _RETREAT_AHEAD, 0.0):
-        return HELD, held
-    near = careless(check)
-    if check.lane.weathered > 0:
-        gets_away, away = _gets_away(near, vessel, LOOK_AHEAD, 0.0)
-        if gets_away:
-            return RETREAT, away
-    scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)
-    for turn in _TURNS:
-        sine, cosine = sincos(turn)
-        x, y = s.x + scale * (cosine * s.vx - sine * s.vy), s.y + scale * (sine * s.vx + cosine * s.vy)
-        x, y, z = inside(check, x, y, min(s.z, -WATER_GATE))
-        back = single(x, y, z, s.psi)
-        copy_vessel(vessel, spare)
-        if rests(near, spare, back, _RETREAT_AHEAD, 0.0):
-            return RETREAT, back
-    return HELD, held
-
-
-__all__ = ["HELD", "RETREAT", "Check", "can_hover", "can_stop", "follow", "goes_on", "rests", "verify"]
+__all__ = ["Check", "can_hover", "can_stop", "follow", "gets_away", "rests", "verify"]

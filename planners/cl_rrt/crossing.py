@@ -28,6 +28,7 @@ _BRAKE_LEAD = 0.3  # s: where a reference that brakes leads the vehicle
 _BRAKE_HEIGHTS = (0.9, 1.3)  # m: the lower one is quicker, and enters the zone too early from a steep descent
 _BRAKE_SHARES = (0.0, 0.5, 1.0)  # of the reference in force in the one that brakes: the less, the harder
 _RISING = 0.5  # m: depth of the reference that a vehicle swims on with, until it brakes before the zone
+_BLOWN = 1.25  # of what crossings keep from walls: who comes out of the water is caught by the wind
 _SLOW = 1.2  # m/s: a faster vehicle cannot be still at the edge of the zone within a period
 _LEAD = 0.8  # s: within this the reference that leads a vehicle into the zone is sought
 _BISECTIONS = 6
@@ -224,7 +225,8 @@ def cross(p, source, size, sample):
     """Append a whole crossing from open node `source`; return the new size, or the old one if it fails."""
     s, down = node_state(p, source), is_air(node_state(p, source).z)
     column = column_from(p, s, sample)
-    if not column_is_free(p, column[0], column[1], down) or near_walls(p.check, column[0], column[1], 1.0):
+    away = 1.0 if down else _BLOWN
+    if not column_is_free(p, column[0], column[1], down) or near_walls(p.check, column[0], column[1], away):
         return size
     if p.objective.paper > 0.0:
         return cross_as_printed(p, source, size, column)

@@ -35,7 +35,8 @@ from planners.cl_rrt.objective import ObjectiveParams
 from planners.cl_rrt.settings import SettingParams
 from planners.cl_rrt.tree import BACKUP, CROSSING, OPEN, ROOT, Planner, node_state, prune_orphans, reroot
 from planners.clearance import clearance_between
-from planners.stop_check import can_hover, dips, follow, goes_on
+from planners.hold import dips, goes_on
+from planners.stop_check import can_hover, follow
 from planners.tube import NO_TUBE
 
 _BEND = 0.1  # m: how far an edge may leave its chord

@@ -205,13 +205,13 @@ def test_in_weather_more_is_kept_from_walls_and_spheres():
         for reference in [sent[0], *[held[0]] * 12]:
             rollout.fly(row, reference)
             ends[level].append(row["state"][0, 0])
-    assert max(ends[3]) <= 9.85 < 9.88 < max(ends[0]) < 10.0
+    assert max(ends[3]) <= 9.6 + 1e-9 < 9.88 < max(ends[0]) < 10.0  # who is nearer than `room` comes no nearer
     assert {name: value for name, value in caution_at(3)._asdict().items() if name != "tube"} == pytest.approx(
         {
-            "margin": 0.15,
+            "margin": 0.2,
             "edge_margin": 0.25,
             "rest_margin": 0.12,
-            "room": 0.15,
+            "room": 0.75,
             "crossing_speed": 0.15,
             "crossing_tilt": np.radians(4.5),
             "drift": 1.5,

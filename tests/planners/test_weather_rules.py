@@ -66,3 +66,34 @@ def test_nobody_rises_behind_the_shield_who_moves_sideways_through_the_water():
     assert rising(0.2, 0.2)
     assert not rising(0.5, 0.0)
     assert not rising(0.0, 0.4)
+
+
+def under_water(x, psi, current, held):
+    """A shield of level 2 and what it sends a vehicle beside the wall at x = 10 m that a current along x carries."""
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=1, controller="robust", weather=2)
+    shield, (observation, _) = Shield.for_env(None, env, level=2), env.reset(seed=0)
+    observation["state"][:], observation["integral"][:] = (x, 0, -2.5, 0, 0, psi, current, 0, 0, 0, 0, 0), 0.0
+    observation["reference"][:], observation["obstacles"] = held, np.zeros((1, 4))
+    sight = Sight(*(observation[key] for key in ("state", "integral", "reference")), np.array([0, 0, 0, current, 0, 0]))
+    return shield.check(observation, np.array([held]), observation["reference"][None], sights=(sight,))
+
+
+def test_who_is_carried_toward_a_wall_swims_away_from_it_in_time():
+    """Half a meter off, along the wall: it may not stay, and of the ways that are safe it takes one that leads away."""
+    stay = (9.45, 0.0, -2.5, 1.2)
+    for psi in (1.2, np.pi / 2, -1.2):
+        sent, _, choice = under_water(9.45, psi, 0.15, stay)
+        assert choice[0] != 0
+        assert sent[0, 0] < 9.45
+    assert under_water(8.0, 1.2, 0.15, (8.0, 0.0, -2.5, 1.2))[2][0] == 0
+
+
+def test_a_crossing_that_has_begun_goes_on_behind_the_shield():
+    """Between the waves nothing else is flown than what was verified before, whatever is proposed."""
+    env = gym.make("HydroneGym/Mission-v0", num_obstacles=1, controller="robust", weather=2)
+    shield, (observation, _) = Shield.for_env(None, env, level=2), env.reset(seed=0)
+    observation["obstacles"], down = np.zeros((1, 4)), np.array([[0.0, 0.0, -1.0, 0.0]])
+    for z, goes_on in ((0.9, False), (0.3, True), (0.05, True)):
+        observation["state"][:], observation["integral"][:] = (0, 0, z, *np.zeros(5), -0.3, 0, 0, 0), 0.0
+        sent, _, _ = shield.check(observation, np.array([[0.0, 0.0, 2.0, 0.0]]), down)
+        assert (sent[0, 2] == -1.0) == goes_on
