@@ -4,7 +4,7 @@ from functools import partial
 from typing import Any
 
 from agents.agent import load_agent
-from planners.named import level_of
+from planners.named import weather_shield
 from planners.shield import Shield
 
 ppo = partial(load_agent, "ppo")
@@ -20,12 +20,12 @@ def ppo_shield(env: Any) -> Shield:
 
 def ppo_shield_weather(env: Any) -> Shield:
     """Return the same behind a shield that is ready for weather."""
-    return Shield.for_env(load_agent("ppo-shield", env), env, level=level_of(env))
+    return weather_shield(load_agent("ppo-shield", env), env)
 
 
 def ppo_weather_shield(env: Any) -> Shield:
     """Return the agent that learnt in weather, behind a shield that is ready for weather."""
-    return Shield.for_env(ppo_weather(env), env, level=level_of(env))
+    return weather_shield(ppo_weather(env), env)
 
 
 def sac_shield(env: Any) -> Shield:

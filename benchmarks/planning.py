@@ -3,6 +3,7 @@
     python -m benchmarks.planning                       # six mission types, 20 and 40 spheres, 1,000 worlds each
     python -m benchmarks.planning --worlds 200 --sets experiment-1 experiment-2 --density 20
     python -m benchmarks.planning --controller robust --crossing aggressive --sets experiment-1 --density 20
+    python -m benchmarks.planning --weather 2 --controller robust --sets experiment-1 experiment-2 missions --density 20
 
 World k of a set is drawn from seed k. Every flight goes through the registered environment. Worlds whose flight does
 not end at the goal are saved as scenario files beside the results, named after set, density, seed and outcome.
@@ -36,6 +37,7 @@ SETS = {
     "water-water": ScenarioLaw(media=("water", "water")),
     "air-water": ScenarioLaw(media=("air", "water")),
     "water-air": ScenarioLaw(media=("water", "air")),
+    "missions": ScenarioLaw(),
 }
 DENSITIES = {20: (0.5, 1.5), 40: DENSE}
 
@@ -46,7 +48,7 @@ class Arguments:
 
     worlds: int = 1000
     """Worlds a set."""
-    sets: tuple[str, ...] = tuple(SETS)
+    sets: tuple[str, ...] = tuple(SETS)[:-1]
     """Mission types."""
     density: tuple[int, ...] = tuple(DENSITIES)
     """Numbers of spheres: 20 of 0.5-1.5 m, or 40 of 0.8-1.8 m radius."""
@@ -54,6 +56,8 @@ class Arguments:
     """Parameter set."""
     controller: Literal["paper", "robust"] = "paper"
     """Control law."""
+    weather: int = 0
+    """Level of weather that is flown in, and that the planner is ready for."""
     crossing: Literal["vertical", "adaptive", "aggressive"] = "vertical"
     """What a crossing may be."""
     period: float = 0.5
@@ -92,21 +96,22 @@ def fly_some(name: str, density: int, seeds: list[int], a: Arguments) -> list[Fl
         gains = dataclasses.replace(vehicle.robust_gains, speed_limit=a.cruise)
         vehicle = dataclasses.replace(vehicle, robust_gains=gains)
     options: dict[str, Any] = {"vehicle": vehicle, "controller": a.controller, "crossing": a.crossing}
-    options |= {"period": a.period, "num_obstacles": density, "disable_env_checker": True}
+    options |= {"weather": a.weather, "period": a.period, "num_obstacles": density, "disable_env_checker": True}
     env = gym.make("HydroneGym/Mission-v0", **options)
-    planner: Any = CLRRT.for_env(env, iterations=a.iterations, objective=a.objective, latency=a.latency)
+    budget: dict[str, Any] = {"iterations": a.iterations, "objective": a.objective, "latency": a.latency}
+    planner: Any = CLRRT.for_env(env, level=a.weather, **budget)
     law, flown = law_of(name, density), []
     observation, _ = env.reset(seed=0)
     planner.predict(observation)  # compiled, or loaded from the cache, before anything is timed
     for seed in seeds:
         scenario = generate(law, World(), vehicle.radius, np.random.default_rng(seed))
-        flight = fly(env, planner, scenario=scenario)
+        flight = fly(env, planner, seed=seed, scenario=scenario)
         record = record_of((name, f"{density} spheres", seed, "clrrt"), flight)
         flown.append(Flown(record, float((flight.trace.states[:, 2] < 0.0).mean()), flight.decision_ms))
         if not record.success:
             folder = a.out.parent / "failed"
             folder.mkdir(parents=True, exist_ok=True)
-            kind = f"{a.vehicle}-{a.controller}-{a.crossing}-{a.objective}"
+            kind = f"{a.vehicle}-{a.controller}-{a.weather}-{a.crossing}-{a.objective}"
             stem = f"{kind}-{name}-{density}-{seed}-{record.outcome.lower()}"
             save_scenario(scenario, folder / f"{stem}.json")
     return flown

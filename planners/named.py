@@ -25,3 +25,8 @@ def clrrt_weather(env: Any, seed: int = 0) -> CLRRT:
 def straight_line_shield(env: Any) -> Shield:
     """Return the straight line behind the shield, for an environment."""
     return Shield.for_env(StraightLine.for_env(env), env)
+
+
+def weather_shield(policy: Any, env: Any) -> Shield:
+    """Return any policy behind a shield that is ready for an environment's level of weather."""
+    return Shield.for_env(policy, env, level=level_of(env))
