@@ -22,7 +22,7 @@ from hydrone_gym.evaluation.provenance import machine
 from hydrone_gym.evaluation.run import carry_out
 from hydrone_gym.evaluation.run_folder import LATEX, ROWS, SUMMARY, TABLES, RunFolder, write_results
 from hydrone_gym.evaluation.shown import Writer
-from hydrone_gym.evaluation.suites import in_short
+from hydrone_gym.evaluation.suites import DEFAULT_SUITES, in_short
 from hydrone_gym.evaluation.tables import print_tables
 from hydrone_gym.rendering.files import Width, inches
 from hydrone_gym.rendering.replay import load_viser, write_replay
@@ -37,12 +37,12 @@ class Evaluate:
     The same command goes on where it was stopped, and flies only what is missing.
     """
 
-    suites: tuple[str, ...] = ("paper-20",)
+    suites: tuple[str, ...] = DEFAULT_SUITES
     """Frozen suites paper-20, dense-40, missions, density, weather-0 to weather-5, weather for these six; held-out,
     flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
-    worlds: int = 100  # First so many worlds of each mission.
+    worlds: int = 50  # First so many worlds of each mission.
     seed: int = 0  # Seed for policies that draw; the worlds are those of the suite.
     vehicle: Literal["paper", "physical", "hydrone-2021", "hydrone-agile"] = "paper"  # Parameter set of the vehicle.
     controller: Literal["paper", "robust"] | None = None  # Control law; that of the suite, the paper's, unless given.

@@ -34,8 +34,11 @@ DEFAULT_POLICIES = (
     "potential-field",
     "clrrt-published",
     "clrrt",
+    "clrrt-weather",
     "ppo",
     "ppo-shield",
+    "ppo-weather",
+    "ppo-weather-shield",
     "sac",
 )
 _NAMES, _FOLDERS, _WRAPPERS = "hydrone_gym.policies", "hydrone_gym.policy_folders", "hydrone_gym.policy_wrappers"

@@ -15,7 +15,7 @@ from hydrone_gym.evaluation.plan import Plan, PoliciesLike, SuiteLike, fly_job, 
 from hydrone_gym.evaluation.policies import DEFAULT_POLICIES, Factory
 from hydrone_gym.evaluation.records import Key, Record
 from hydrone_gym.evaluation.run_folder import RunFolder, write_results
-from hydrone_gym.evaluation.suites import Suite
+from hydrone_gym.evaluation.suites import DEFAULT_SUITES, Suite
 from hydrone_gym.evaluation.summary import scores_of
 
 
@@ -29,10 +29,10 @@ class EvaluationStopped(RuntimeError):
 
 
 def evaluate(
-    suites: SuiteLike | Sequence[SuiteLike] = "paper-20",
+    suites: SuiteLike | Sequence[SuiteLike] = DEFAULT_SUITES,
     policies: PoliciesLike = DEFAULT_POLICIES,
     *,
-    worlds: int | None = 100,
+    worlds: int | None = 50,
     seed: int = 0,
     vehicle: str = "paper",
     controller: str | None = None,

@@ -24,6 +24,7 @@ SHA256 = {
     "density-v1": "bb01d4f06de6be8501bb4fc11780bb3f9095c7656e5854dd7d5cd5c024b35238",
     "weather-v1": "9648190c661d00b8bb370674cef3e166951be698c861cb904c9cdc5a18896b75",  # the worlds of every level
 }
+DEFAULT_SUITES = ("paper-20", "weather-2")
 HELD_OUT = 10_000_000  # seeds from here on are for evaluation; training uses those below
 MISSIONS = ("HydroneGym/Mission-v0", "HydroneGym/AirToWater-v0", "HydroneGym/WaterToAir-v0")
 _HELD_OUT = re.compile(r"held-out(?:-obstacles-(\d{1,3}))?(?:-radii-(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?))?")

@@ -20,7 +20,8 @@ PROGRAM = (
     "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
     "from hydrone_gym.cli import main; sys.exit(main())"
 )
-TWO = ["--policies", "straight-line", "straight-line-shield", "--jobs", "1"]
+PAPER = ["--suites", "paper-20"]
+TWO = [*PAPER, "--policies", "straight-line", "straight-line-shield", "--jobs", "1"]
 
 # What somebody writes who has read docs/evaluation.md and nothing else.
 THIRD_PARTY = '''
@@ -63,7 +64,7 @@ def test_writes_rows_summary_and_tables(tmp_path, capsys):
     with (tmp_path / "rows.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 2 * 2 * 3
-    assert timeless(read_records(tmp_path / "rows.csv")) == timeless(evaluate("paper-20", TWO[1:3], worlds=3))
+    assert timeless(read_records(tmp_path / "rows.csv")) == timeless(evaluate("paper-20", TWO[3:5], worlds=3))
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["complete"]
     assert summary["rows"] == 12
@@ -119,7 +120,7 @@ def test_somebody_elses_policy_is_ranked_beside_ours(tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     (tmp_path / "climber.py").write_text(THIRD_PARTY)
     policies = ["straight-line", "clrrt", "over-the-top=climber.py:OverTheTop", "climber:OverTheTop"]
-    options = ["--policies", *policies, "--worlds", "10", "--jobs", "2", "--out", "out", "--json"]
+    options = [*PAPER, "--policies", *policies, "--worlds", "10", "--jobs", "2", "--out", "out", "--json"]
     assert cli.main(["evaluate", *options]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["arguments"]["baseline"] == "clrrt"
@@ -133,12 +134,12 @@ def test_somebody_elses_policy_is_ranked_beside_ours(tmp_path, monkeypatch, caps
     assert ranked["over-the-top"]["time"] == ranked["climber:OverTheTop"]["time"]
 
 
-STOPPED = ["--policies", "straight-line-shield", "clrrt", "--worlds", "14", "--jobs", "2"]
+STOPPED = [*PAPER, "--policies", "straight-line-shield", "clrrt", "--worlds", "14", "--jobs", "2"]
 
 
 @pytest.fixture(scope="module")
 def uninterrupted():
-    return evaluate("paper-20", STOPPED[1:3], worlds=14)
+    return evaluate("paper-20", STOPPED[3:5], worlds=14)
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
@@ -182,7 +183,17 @@ def test_a_folder_in_use_gives_2_at_once_and_a_killed_run_leaves_it_free(tmp_pat
 def test_an_edited_policy_is_told_and_flown_anew(tmp_path, capsys):
     file = tmp_path / "climber.py"
     file.write_text(THIRD_PARTY)
-    command = ["evaluate", "--policies", "straight-line", f"climber={file}:OverTheTop", "--worlds", "2", "--jobs", "1"]
+    command = [
+        "evaluate",
+        *PAPER,
+        "--policies",
+        "straight-line",
+        f"climber={file}:OverTheTop",
+        "--worlds",
+        "2",
+        "--jobs",
+        "1",
+    ]
     command += ["--out", str(tmp_path / "out"), "--json"]
     assert cli.main(command) == 0
     out, err = capsys.readouterr()
@@ -253,7 +264,16 @@ def test_a_failing_policy_gives_1_and_names_the_flight(tmp_path, capsys):
     (tmp_path / "leaky.py").write_text(
         "class Leaky:\n  def __init__(self, env):\n    pass\n  predict = None.__init__\n"
     )
-    options = ["--policies", "straight-line", f"leaky={tmp_path / 'leaky.py'}:Leaky", "--jobs", "1", "--worlds", "2"]
+    options = [
+        *PAPER,
+        "--policies",
+        "straight-line",
+        f"leaky={tmp_path / 'leaky.py'}:Leaky",
+        "--jobs",
+        "1",
+        "--worlds",
+        "2",
+    ]
     assert cli.main(["evaluate", *options, "--out", str(tmp_path / "out")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "policy 'leaky' failed in suite paper-20-v1, mission air-to-water, world 0: " in line

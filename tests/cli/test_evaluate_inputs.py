@@ -110,7 +110,7 @@ def test_a_policy_that_prints_and_spoils_what_it_is_given_changes_nothing(writte
     spoil = (
         "print('ahoy'); moved = there.copy(); [part.fill(np.nan) for part in observation.values()]; observation.clear()"
     )
-    options = ["--worlds", "1", "--json", "--out", str(tmp_path)]
+    options = ["--suites", "paper-20", "--worlds", "1", "--json", "--out", str(tmp_path)]
     assert cli.main(["evaluate", "--policies", written(), "--jobs", "1", *options]) == 0
     before = read_records(tmp_path / "rows.csv")
     command = [

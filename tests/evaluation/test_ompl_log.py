@@ -14,7 +14,8 @@ from hydrone_gym.evaluation.plan import make_plan
 from hydrone_gym.evaluation.records import COLUMNS
 from hydrone_gym.evaluation.run_folder import write_results
 
-OPTIONS = ["--worlds", "3", "--jobs", "1", "--policies", "straight-line", "shielded=straight-line-shield"]
+FEW = ["--suites", "paper-20", "--worlds", "3", "--jobs", "1"]
+OPTIONS = [*FEW, "--policies", "straight-line", "shielded=straight-line-shield"]
 FLOAT, INT = r"(inf|\d+(?:\.\d*)?(?:e[-+]?\d+)?)", r"(\d+)"
 OTHERWISE = {"solved": "success", "solution_length": "length", "solution_clearance": "clearance"}
 
