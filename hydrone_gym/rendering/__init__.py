@@ -15,7 +15,7 @@ docs/rendering.md shows both and how videos are made. A module imports only from
     what is drawn on    frame (pictures) · stage (pages) · scene3d, files (figures)
     with what           shapes · raycast
     what rays meet      solids, backdrop
-    what there is       track (flights) · camera · paths · style · foxglove_schemas
+    what there is       track (flights) · camera · paths · style
 
 What an obstacle looks like, each of them asks `hydrone_gym.world.bodies`.
 """

@@ -1,4 +1,4 @@
-"""A flight as MCAP, a file of timed messages that Foxglove plays: Foxglove's own messages, as JSON with their schemas.
+"""A flight as MCAP, a file of timed messages that Foxglove and Rerun play: Foxglove's own messages, as Protobuf.
 
 | topic | message | when |
 |---|---|---|
@@ -7,12 +7,15 @@
 | `/goal` | `foxglove.PoseInFrame` | at the start |
 | `/scene` | `foxglove.SceneUpdate`: vehicle, box, water, goal, obstacles, path | at the start, and what has changed |
 | `/tree` | `foxglove.SceneUpdate`: the planner's tree | every period of a flight with trees |
-| `/weather` | `hydrone_gym.Weather`: wind, water, elevation | every tick, in weather |
+| `/weather/wind`, `/weather/water` | `foxglove.Vector3`, m/s, around the vehicle | every tick, in weather |
+| `/weather/surface` | `foxglove.PoseInFrame`: the surface above or below the vehicle | every tick, in weather |
 | `/weather/scene` | `foxglove.SceneUpdate`: arrows of wind and current, lines on the surface | every tick, in weather |
+
+Messages are written down here as the JSON that Protobuf takes, a field that has no value left out.
 """
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +26,6 @@ from scipy.spatial.transform import Rotation
 
 from hydrone_gym._whole_file import whole
 from hydrone_gym.rendering import shapes, style
-from hydrone_gym.rendering.foxglove_schemas import FRAME_TRANSFORM, POSE_IN_FRAME, PRIMITIVES, SCENE_UPDATE, WEATHER
 from hydrone_gym.rendering.outdoors import Outdoors, barbed
 from hydrone_gym.rendering.stage import DETECTED, UNKNOWN, VEHICLE_SCALE, Mesh, model, walls
 from hydrone_gym.rendering.track import CONDITIONS_AT, Flown, Moment, Tree, moment_of, moments
@@ -32,15 +34,19 @@ from hydrone_gym.simulation.simulation import Simulation
 from hydrone_gym.world.bodies import placed
 from hydrone_gym.world.world import World
 
+_POSE_IN_FRAME, _SCENE_UPDATE = "PoseInFrame", "SceneUpdate"
 _TOPICS = {
-    "/vehicle": FRAME_TRANSFORM,
-    "/reference": POSE_IN_FRAME,
-    "/goal": POSE_IN_FRAME,
-    "/scene": SCENE_UPDATE,
-    "/tree": SCENE_UPDATE,
-    "/weather": WEATHER,
-    "/weather/scene": SCENE_UPDATE,
+    "/vehicle": "FrameTransform",
+    "/reference": _POSE_IN_FRAME,
+    "/goal": _POSE_IN_FRAME,
+    "/scene": _SCENE_UPDATE,
+    "/tree": _SCENE_UPDATE,
+    "/weather/wind": "Vector3",
+    "/weather/water": "Vector3",
+    "/weather/surface": _POSE_IN_FRAME,
+    "/weather/scene": _SCENE_UPDATE,
 }
+_TIMELESS = {"/weather/wind": "wind", "/weather/water": "water"}  # topics of messages without a time of their own
 _SECOND = 1_000_000_000  # ns
 _STRIP, _LOOP, _LIST = 0, 1, 2  # what lines connect: one point to the next, all of them in a ring, or every two
 _GLASS = 0.5  # opacity
@@ -51,14 +57,13 @@ _Entities = Iterator[tuple[str, _Message]]  # names, and what they are made of
 
 
 def load_mcap() -> Any:
-    """Return the module mcap.writer; DependencyNotInstalled without the extra `mcap`."""
+    """Return the module mcap_protobuf.writer; DependencyNotInstalled without the extra `mcap`."""
     try:
-        import mcap.writer
+        return import_module("mcap_protobuf.writer")
     except ImportError as error:
         raise DependencyNotInstalled(
-            'MCAP files need mcap, part of the extra "mcap": pip install "hydrone-gym[mcap]"'
+            'MCAP files need mcap-protobuf-support, part of the extra "mcap": pip install "hydrone-gym[mcap]"'
         ) from error
-    return mcap.writer
 
 
 def write_mcap(
@@ -76,20 +81,14 @@ def write_mcap(
     file, writing = Path(path).absolute(), load_mcap()
     if not file.parent.is_dir():
         raise FileNotFoundError(f"the folder of the MCAP file does not exist: {file.parent}")
-    schemas: dict[str, int] = {}
-    channels: dict[str, int] = {}
-    with whole(file) as part, part.open("wb") as stream:
-        writer = writing.Writer(stream)
-        writer.start(library="hydrone_gym")
+    parsed = import_module("google.protobuf.json_format").ParseDict
+    modules = {kind: import_module(f"foxglove_schemas_protobuf.{kind}_pb2") for kind in set(_TOPICS.values())}
+    with whole(file) as part, part.open("wb") as stream, writing.Writer(stream) as writer:
         for time, topic, message in _messages(flight, simulation, trees):
-            if topic not in channels:
-                schema = _TOPICS[topic]
-                if (name := schema["title"]) not in schemas:
-                    schemas[name] = writer.register_schema(name, "jsonschema", _json(schema))
-                channels[topic] = writer.register_channel(topic, "json", schemas[name])
-            writer.add_message(channels[topic], time, _json(message), time)
-        writer.add_metadata("flight", {"title": title, "outcome": flight.outcome.name, "time": f"{flight.time:g}"})
-        writer.finish()
+            made = parsed(message, getattr(modules[_TOPICS[topic]], _TOPICS[topic])())
+            writer.write_message(topic, made, log_time=time, publish_time=time)
+        about = {"title": title, "outcome": flight.outcome.name, "time": f"{flight.time:g}"}
+        writer.add_metadata("flight", about)
 
 
 def _messages(flight: Flown, simulation: Simulation, trees: Sequence[Tree]) -> Iterator[tuple[int, str, _Message]]:
@@ -99,9 +98,9 @@ def _messages(flight: Flown, simulation: Simulation, trees: Sequence[Tree]) -> I
         tick = len(now.ticks) - 1
         period, within = divmod(tick, simulation.ticks)
         time = round(_SECOND * float(flight.trace.times[tick]))
-        stamp = {"sec": time // _SECOND, "nsec": time % _SECOND}
+        stamp = f"1970-01-01T00:{time // (60 * _SECOND):02d}:{time / _SECOND % 60:012.9f}Z"
         for topic, message in _moving(now):
-            yield time, topic, {"timestamp": stamp, **message}
+            yield time, topic, message if topic in _TIMELESS else {"timestamp": stamp, **message}
         entities = [] if before else [*_standing(now, simulation)]
         entities += [*_detected(now, before), *_flown(now, simulation.ticks)]
         if entities:
@@ -124,8 +123,10 @@ def _moving(now: Moment) -> Iterator[tuple[str, _Message]]:
         yield "/goal", {"frame_id": "world", "pose": _pose(now.goal)}
     if (conditions := now.ticks[-1:, CONDITIONS_AT:]).size:
         around = weather_at(conditions, 1, 1)
-        blowing = {name: _xyz(around[name][0]) for name in ("wind", "water")}
-        yield "/weather", {**blowing, "elevation": float(around["elevation"][0])}
+        for topic, name in _TIMELESS.items():
+            yield topic, _xyz(around[name][0])
+        surface = (state[0], state[1], around["elevation"][0])
+        yield "/weather/surface", {"frame_id": "world", "pose": _pose(surface)}
 
 
 def _standing(now: Moment, simulation: Simulation) -> _Entities:
@@ -172,13 +173,12 @@ def _blowing(now: Outdoors) -> list[_Message]:
     return arrows + [_line(wave, style.BLUE, _STRIP) for wave in now.waves]
 
 
-def _update(stamp: _Message, entities: Iterable[tuple[str, _Message]]) -> _Message:
+def _update(stamp: str, entities: Iterable[tuple[str, _Message]]) -> _Message:
     """Return entities, names and what they are made of, as a message; each replaces the one of its name."""
-    kept = {"timestamp": stamp, "lifetime": {"sec": 0, "nsec": 0}, "metadata": []} | {kind: [] for kind in PRIMITIVES}
     places = {"vehicle": {"frame_id": "vehicle", "frame_locked": True}}
     still = {"frame_id": "world", "frame_locked": False}
-    named = [{**kept, **places.get(name, still), "id": name, **parts} for name, parts in entities]
-    return {"deletions": [], "entities": named}
+    named = [{"timestamp": stamp, **places.get(name, still), "id": name, **parts} for name, parts in entities]
+    return {"entities": named}
 
 
 def _slab(world: World, low: float, high: float, colour: str) -> _Message:
@@ -195,12 +195,12 @@ def _sphere(middle: ArrayLike, radius: float, colour: str, opacity: float) -> _M
 def _line(points: ArrayLike, colour: str, kind: int) -> _Message:
     """Return lines through points (…, 3), two pixels wide."""
     look = {"type": kind, "pose": _pose(_NOWHERE), "thickness": 2.0, "scale_invariant": True}
-    return {**look, "points": _points(points), "color": _colour(colour), "colors": [], "indices": []}
+    return {**look, "points": _points(points), "color": _colour(colour)}
 
 
 def _mesh(part: Mesh, colour: str) -> _Message:
     faces = part.faces.ravel().tolist()
-    drawn = {"points": _points(part.vertices), "color": _colour(colour), "colors": [], "indices": faces}
+    drawn = {"points": _points(part.vertices), "color": _colour(colour), "indices": faces}
     return {"pose": _pose(_NOWHERE), **drawn}
 
 
@@ -222,7 +222,3 @@ def _xyzw(turn: Rotation) -> _Message:
 
 def _colour(colour: str, opacity: float = 1.0) -> _Message:
     return dict(zip("rgba", (*style.rgb(colour), opacity), strict=True))
-
-
-def _json(content: _Message) -> bytes:
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()

@@ -136,7 +136,7 @@ def test_bad_input_gives_2_and_one_line(options, message, flown, evaluated, tmp_
     ("module", "file", "message"),
     [
         ("viser", "a.html", 'replay pages need viser, part of the extra "replay"'),
-        ("mcap.writer", "a.mcap", 'MCAP files need mcap, part of the extra "mcap"'),
+        ("mcap_protobuf.writer", "a.mcap", 'MCAP files need mcap-protobuf-support, part of the extra "mcap"'),
     ],
 )
 def test_without_the_extra_nothing_is_flown(module, file, message, tmp_path, capsys, monkeypatch):
