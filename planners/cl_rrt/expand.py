@@ -23,6 +23,7 @@ GOAL_SAMPLE = 0
 COLUMN_SAMPLE = 1
 CAREFUL_SAMPLE = 2  # near the root, with short steps
 POINT_SAMPLE = 3
+_ENOUGH = 450  # edges of a cycle in weather, where each takes 20 to 40 us; one cycle in twenty comes to as many
 EDGE_TIME = 0.5  # s of an edge, by which limits are counted: shorter periods take more edges to go as far
 _GOAL_EXTENSION = 60  # such edges: a try at the goal may go all the way
 _AROUND = 4.0  # m: most samples lie in the box of root and goal, widened by this
@@ -207,6 +208,8 @@ def expand_tree(p, size, draws, iterations, roam):
     goal_air, paper = is_air(p.check.goal.z), p.objective.paper > 0.0
     best, beyond = least_cost(p, size), any_beyond(p, size)
     for iteration in range(iterations):
+        if p.check.lane.weathered > 0 and p.edges[0] > _ENOUGH:
+            break
         k = iteration * DRAWS
         sample = draw_sample(p, draws, k, roam, beyond and best == np.inf and not paper)
         by_cost = draws[k + 1] < 0.5 and not paper
