@@ -2,6 +2,7 @@
 
     python -m benchmarks.weather_levels                                # ten entrants, six levels: hours
     python -m benchmarks.weather_levels --worlds 100 --slow-worlds 10 --levels 0 2 --out /tmp/trial --runs /tmp/runs
+    python -m benchmarks.weather_levels --slow-worlds 40 --picture docs/images/weather-levels.png
 
 All fly the same held-out worlds of every mission at every level, those that take long to decide the first of them. What
 was not made for weather flies under both laws, which tells what the law does from what the policy does. The same
@@ -21,10 +22,11 @@ from rich.console import Console
 from benchmarks.tables import Sheet
 from benchmarks.timing import RESULTS, save
 from hydrone_gym.evaluation import Record, Suite, evaluate
-from hydrone_gym.evaluation.levels import level_tables
+from hydrone_gym.evaluation.levels import by_policy, flown_levels, level_tables, plot_levels
 from hydrone_gym.evaluation.statistics import Estimate, paired_success
-from hydrone_gym.evaluation.summary import summarise
+from hydrone_gym.evaluation.summary import ALL_MISSIONS, summarise
 from hydrone_gym.evaluation.tables import markdown
+from hydrone_gym.rendering.files import save_figure
 from hydrone_gym.weather.weather import LEVELS
 
 FAST = {"paper": ("ppo",), "robust": ("ppo", "ppo-weather")}  # by law
@@ -33,6 +35,14 @@ SLOW = {
     "robust": ("clrrt", "clrrt-weather", "ppo-shield", "ppo-shield-weather", "ppo-weather-shield"),
 }
 LOSS = 0.05  # of success, against level 0
+PICTURED = (
+    "clrrt-weather, robust",
+    "ppo-weather, robust",
+    "ppo, robust",
+    "clrrt, robust",
+    "ppo, paper",
+    "clrrt, paper",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +59,8 @@ class Arguments:
     """Folder of the flights."""
     out: Path = RESULTS
     """Folder of weather_levels.json."""
+    picture: Path | None = None
+    """PNG of success against the level, of some of them."""
 
 
 def flown(a: Arguments) -> list[Record]:
@@ -98,6 +110,14 @@ def sheet(records: Sequence[Record], levels: Sequence[int]) -> Sheet:
     return Sheet("What weather costs", columns, rows, [note])
 
 
+def draw(records: Sequence[Record], path: Path) -> None:
+    """Draw success of the entrants in `PICTURED` against the level, the best first."""
+    shown = [replace(row, policy=row.policy.removesuffix(" law")) for row in records]
+    levels = flown_levels(summarise([row for row in shown if row.policy in PICTURED]))[ALL_MISSIONS]
+    figure = plot_levels(list(by_policy(levels)), levels, title="Flights that arrive, in weather, by control law")
+    save_figure(figure, path.with_suffix(""), formats=("png",))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     a = tyro.cli(Arguments, args=given, description=__doc__)
@@ -109,6 +129,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     costs = sheet(records, a.levels)
     told = costs.markdown() + "\n" + markdown(level_tables(summarise(records)))
     Console().print(told, soft_wrap=True, markup=False)
+    if a.picture is not None:
+        draw(records, a.picture)
     command = shlex.join(["python", "-m", "benchmarks.weather_levels", *given])
     measured = {"worlds": a.worlds, "slow_worlds": a.slow_worlds, "tables": told.splitlines()}
     print(save("weather_levels", command, measured, a.out))

@@ -1,6 +1,7 @@
 """Success against the level of weather, for evaluations that hold two levels or more."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,11 @@ from numpy.typing import NDArray
 from hydrone_gym.evaluation.suites import level_of
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, MissionSummary, PolicySummary
 from hydrone_gym.evaluation.tables import NONE, Table, cell
-from hydrone_gym.rendering.comparison import shortened
+from hydrone_gym.rendering.comparison import plot_rates, shortened
 from hydrone_gym.weather.weather import LEVELS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _CAUSES = {
     "collision": "collisions",
@@ -73,6 +77,16 @@ def level_overview(summaries: Sequence[MissionSummary]) -> list[Table]:
         heads = ("policy", *(f"level {level}" for level in levels))
         return [Table(f"{mission}: success (%) by level", heads, rows, tuple(flown))]
     return []
+
+
+def plot_levels(policies: Sequence[str], levels: dict[int, MissionSummary], *, title: str) -> "Figure":
+    """Draw success of policies against the level of weather; what that is stands below."""
+    weathers = [LEVELS[level] for level in levels]
+    ticks = [f"{k}\n{w.wind:g}\n{w.current:g}\n{w.wave_height:g}" for k, w in zip(levels, weathers, strict=True)]
+    flown = by_policy(levels)
+    shares = {policy: rates(flown.get(policy, {}), list(levels)) for policy in policies}
+    label = "level, wind (m/s), current (m/s), waves (m)"
+    return plot_rates(list(levels), shares, label, ticks=ticks, whole=True, title=title)
 
 
 def rates(entries: dict[int, PolicySummary], levels: Sequence[int]) -> NDArray[np.float64]:

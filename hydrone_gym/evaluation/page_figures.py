@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hydrone_gym.evaluation.levels import by_policy, flown_levels, rates
+from hydrone_gym.evaluation.levels import flown_levels, plot_levels
 from hydrone_gym.evaluation.records import Record
 from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.evaluation.summary import ALL_MISSIONS, LIMITS, MissionSummary
 from hydrone_gym.rendering.comparison import plot_decisions, plot_distributions, plot_rates, plot_success
 from hydrone_gym.rendering.files import save_figure, to_svg
-from hydrone_gym.weather.weather import LEVELS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,16 +139,10 @@ def _density(policies: Sequence[str], records: Sequence[Record]) -> list[Panel]:
 
 
 def _weather(policies: Sequence[str], summaries: Sequence[MissionSummary]) -> list[Panel]:
-    panels = []
-    label = "level, wind (m/s), current (m/s), waves (m)"
-    for mission, levels in flown_levels(summaries).items():
-        flown = by_policy(levels)
-        shares = {policy: rates(flown.get(policy, {}), list(levels)) for policy in policies}
-        weathers = [LEVELS[level] for level in levels]
-        ticks = [f"{k}\n{w.wind:g}\n{w.current:g}\n{w.wave_height:g}" for k, w in zip(levels, weathers, strict=True)]
-        figure = plot_rates(list(levels), shares, label, ticks=ticks, whole=True, title=mission)
-        panels.append(_panel(figure, f"Success against weather: {mission}"))
-    return panels
+    return [
+        _panel(plot_levels(policies, levels, title=mission), f"Success against weather: {mission}")
+        for mission, levels in flown_levels(summaries).items()
+    ]
 
 
 def _rate(records: Sequence[Record], policy: str, count: int) -> tuple[float, float, float]:

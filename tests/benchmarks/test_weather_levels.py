@@ -2,6 +2,7 @@
 
 import json
 
+import matplotlib.pyplot as plt
 import pytest
 
 from benchmarks import weather_levels
@@ -17,6 +18,7 @@ def told(value, half):
 @pytest.fixture
 def small(tmp_path, monkeypatch):
     """Two entrants of which one flies under both laws."""
+    monkeypatch.setattr(weather_levels, "PICTURED", ("straight-line, robust", "potential-field, robust"))
     monkeypatch.setattr(weather_levels, "FAST", {"paper": ("straight-line",), "robust": ("straight-line",)})
     monkeypatch.setattr(weather_levels, "SLOW", {"paper": (), "robust": ("potential-field",)})
     return Arguments(worlds=4, slow_worlds=2, levels=(0, 3), runs=tmp_path / "runs", out=tmp_path)
@@ -60,7 +62,9 @@ def test_five_points_are_lost_at_the_first_level_that_loses_them():
 
 def test_the_command_prints_and_keeps_the_tables(small, capsys):
     given = ["--worlds", "4", "--slow-worlds", "2", "--levels", "0", "3"]
-    assert weather_levels.main([*given, "--runs", str(small.runs), "--out", str(small.out)]) == 0
+    given += ["--runs", str(small.runs), "--out", str(small.out), "--picture", str(small.out / "levels.png")]
+    assert weather_levels.main(given) == 0
+    assert plt.imread(small.out / "levels.png").std() > 0.05
     printed = capsys.readouterr().out
     kept = json.loads((small.out / "weather_levels.json").read_text())
     assert "| straight-line, robust law |" in printed
