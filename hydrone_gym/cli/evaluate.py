@@ -42,7 +42,7 @@ class Evaluate:
     flown in batches; or files or folders of yours."""
     policies: tuple[str, ...] = DEFAULT_POLICIES
     """Registered names, module:attribute, file.py:attribute or an agent's folder, also as LABEL=… and …+shield."""
-    worlds: int = 25  # First so many worlds of each mission.
+    worlds: int = 50  # First so many worlds of each mission.
     seed: int = 0  # Seed for policies that draw; the worlds are those of the suite.
     vehicle: Literal["paper", "physical", "hydrone-2021", "hydrone-agile"] = "paper"  # Parameter set of the vehicle.
     controller: Literal["paper", "robust"] | None = None  # Control law; that of the suite, the paper's, unless given.

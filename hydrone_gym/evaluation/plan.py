@@ -164,7 +164,7 @@ def make_plan(
     suites: SuiteLike | Sequence[SuiteLike] = "paper-20",
     policies: PoliciesLike = DEFAULT_POLICIES,
     *,
-    worlds: int | None = 25,
+    worlds: int | None = 50,
     seed: int = 0,
     vehicle: str = "paper",
     controller: str | None = None,

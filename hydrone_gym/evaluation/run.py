@@ -32,7 +32,7 @@ def evaluate(
     suites: SuiteLike | Sequence[SuiteLike] = DEFAULT_SUITES,
     policies: PoliciesLike = DEFAULT_POLICIES,
     *,
-    worlds: int | None = 25,
+    worlds: int | None = 50,
     seed: int = 0,
     vehicle: str = "paper",
     controller: str | None = None,
