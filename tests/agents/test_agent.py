@@ -206,5 +206,5 @@ def test_shipped_agents(name):
     assert sum(file.stat().st_size for file in folder.iterdir()) < 2_000_000
     assert "## Success on held-out worlds" in (folder / "README.md").read_text(encoding="utf-8")
     worlds = Suite.drawn(ID, range(HELD_OUT, HELD_OUT + 100), HOME.get(name))
-    records = evaluate(worlds, {name: lambda env: load_agent(name, env)})
+    records = evaluate(worlds, {name: lambda env: load_agent(name, env)}, worlds=100)
     assert sum(record.success for record in records) > 90
