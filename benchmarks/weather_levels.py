@@ -114,7 +114,7 @@ def draw(records: Sequence[Record], path: Path) -> None:
     """Draw success of the entrants in `PICTURED` against the level, the best first."""
     shown = [replace(row, policy=row.policy.removesuffix(" law")) for row in records]
     levels = flown_levels(summarise([row for row in shown if row.policy in PICTURED]))[ALL_MISSIONS]
-    figure = plot_levels(list(by_policy(levels)), levels, title="Flights that arrive, in weather, by control law")
+    figure = plot_levels(list(by_policy(levels)), levels, title="Success by weather and law")
     save_figure(figure, path.with_suffix(""), formats=("png",))
 
 

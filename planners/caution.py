@@ -13,6 +13,7 @@ from planners.tube import NO_TUBE, tube_of
 
 _TAKEN = 5.0  # s to be through the zone and get away from what a current pushes to
 _TURNED = 2.5  # s to be turned so far that thrust takes effect: who is nearer to a wall may be carried into it
+_NEAR_GOALS = 0.75  # m: more would keep vehicles from goals, which lie 1 m from walls, see `check.inside`
 _TUNED = 3.0  # the level whose margins were tried; those of others are in proportion
 
 
@@ -40,7 +41,7 @@ def caution_at(level: Any) -> Caution:
         return Caution(MARGIN, 0.12, MARGIN, 0.0, 0.1, math.radians(2.0), 0.0)
     share, current = level / _TUNED, LEVELS[level].current
     margins = (MARGIN + 0.15 * share, 0.12 + 0.13 * share, MARGIN + 0.07 * share)
-    return Caution(*margins, _TURNED * current, 0.15, math.radians(4.5), _TAKEN * current)
+    return Caution(*margins, min(_TURNED * current, _NEAR_GOALS), 0.15, math.radians(4.5), _TAKEN * current)
 
 
 def caution_for(belief: Belief, level: Any, promise: float | None = None) -> Caution:
