@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from planners.belief import Belief
 from planners.check import TUBE_LENGTH
 
-PLACES = ("air", "surface", "water")  # of a look, see `planners.stop_check.place_of`
+PLACES = ("air", "surface", "water")  # of a look, see `planners.check.place_of`
 FILE = Path(__file__).parent / "tubes.json"
 NO_TUBE = np.zeros((len(PLACES), TUBE_LENGTH))
 
