@@ -18,9 +18,9 @@ def ppo_shield(env: Any) -> Shield:
     return Shield.for_env(load_agent("ppo-shield", env), env)
 
 
-def ppo_shield_weather(env: Any) -> Shield:
-    """Return the same behind a shield that is ready for weather."""
-    return weather_shield(load_agent("ppo-shield", env), env)
+def ppo_shield_weather(env: Any, **given: Any) -> Shield:
+    """Return the same behind a shield that is ready for weather, with other arguments of it as given."""
+    return weather_shield(load_agent("ppo-shield", env), env, **given)
 
 
 def ppo_weather_shield(env: Any) -> Shield:

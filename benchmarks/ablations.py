@@ -56,12 +56,12 @@ def weather_without_estimate(env: Any) -> CLRRT:
 
 def weather_without_margins(env: Any) -> CLRRT:
     """Edges and stops keep from spheres what they keep in still weather."""
-    return CLRRT.for_env(env, level=level_of(env), settings=CLRRTSettings())
+    return clrrt_weather(env, settings=CLRRTSettings())
 
 
 def weather_without_verified_stop(env: Any) -> CLRRT:
     """Edges are sent without a look at whether the vehicle can stop, or get away, after them."""
-    return CLRRT.for_env(env, level=level_of(env), settings=replace(clrrt_weather(env).settings, verify=False))
+    return clrrt_weather(env, settings=replace(clrrt_weather(env).settings, verify=False))
 
 
 class NearWalls(CLRRT):

@@ -20,7 +20,7 @@ import gymnasium as gym
 import tyro
 from rich.console import Console
 
-from agents import load_agent
+from agents.named import ppo_shield_weather
 from benchmarks.timing import RESULTS, save
 from hydrone_gym import Spread, Weather
 from hydrone_gym.evaluation import fly_worlds
@@ -29,10 +29,10 @@ from hydrone_gym.evaluation.statistics import wilson_interval
 from hydrone_gym.evaluation.suites import HELD_OUT
 from hydrone_gym.simulation.outcome import Outcome
 from hydrone_gym.weather.weather import LEVELS, ROTOR_DRAG
-from planners import CLRRT, Shield
-from planners.named import level_of
+from planners.named import clrrt_weather
 
 POLICIES = ("clrrt", "clrrt-weather", "ppo-shield", "ppo-shield-weather")
+READY = {"clrrt": clrrt_weather, "ppo-shield": ppo_shield_weather}  # what promises, or flies with latency, besides
 MISSIONS = {
     "air to water": "HydroneGym/AirToWater-v0",
     "water to air": "HydroneGym/WaterToAir-v0",
@@ -75,16 +75,6 @@ class Arguments:
     """Folder of weather_factors.json."""
 
 
-def planner(env: Any, **given: Any) -> CLRRT:
-    """Return CL-RRT that is ready for an environment's level of weather, and whatever else."""
-    return CLRRT.for_env(env, level=level_of(env), **given)
-
-
-def shielded(env: Any, **given: Any) -> Shield:
-    """Return PPO behind a shield that is."""
-    return Shield.for_env(load_agent("ppo-shield", env), env, level=level_of(env), **given)
-
-
 def cell(factor: str, source: PolicySource, mission: str, a: Arguments) -> dict[str, Any]:
     """Fly a policy in the worlds of an experiment in one kind of weather; `failures` by seed."""
     options = {"weather": FACTORS[factor], "controller": a.controller}
@@ -115,7 +105,7 @@ def measure(a: Arguments) -> dict[str, Any]:
     sources, console, cells, began = find_policies(a.policies), Console(stderr=True), [], time.process_time()
     besides: dict[str, dict[str, Any]] = {f"promise-{promise:g}": {"promise": promise} for promise in a.promises}
     besides |= {"latency": {"latency": True}} if a.latency else {}
-    for (words, given), (name, kind) in product(besides.items(), {"clrrt": planner, "ppo-shield": shielded}.items()):
+    for (words, given), (name, kind) in product(besides.items(), READY.items()):
         sources += find_policies({f"{name}-{words}": partial(kind, **given)})
     for factor in a.factors:
         for source in sources:

@@ -36,7 +36,7 @@ class Check(NamedTuple):
     margin: float  # clearance to keep, m, of a vehicle that is where it is believed to be
     near: float  # clearance it has now, m, less `GIVE`: who is nearer than the margin keeps that
     room: float  # m that a vehicle keeps from the walls, and its references more by `_WALL`
-    wall: float  # m that it may come near to the walls, whatever it should keep
+    wall: float  # m that it is from the walls: who is nearer than `room` comes no nearer
     drift: float  # m from the walls, and half as far from spheres, where crossings begin: a current carries it along
     tube: Any  # pointer to how far it may be from where it is believed to be, m, every `TUBE_STEP` after the look
     since: float  # s since that look
@@ -87,12 +87,6 @@ def keeps_room(check, vessel):
     if check.lane.weathered == 0:
         return True
     return from_walls(check.world, state_of(vessel)) >= min(check.room, check.wall)
-
-
-@inlined
-def wall_near(vessel, world):
-    """How near to the walls (m) a vehicle may come, whatever it should keep: not nearer than it is."""
-    return from_walls(world, state_of(vessel))
 
 
 @inlined

@@ -13,7 +13,7 @@ from hydrone_gym.simulation.clock import TICK
 from hydrone_gym.simulation.rollout import lane_of, of_row
 from hydrone_gym.simulation.storage import Point, Pose, vehicle_of, world_of
 from hydrone_gym.world.bodies import BODY, segment_distance
-from planners.check import Check, clearance_left, inside, place_of, single, state_of, wall_near
+from planners.check import Check, clearance_left, from_walls, inside, place_of, single, state_of
 from planners.hold import HELD, crosses, goes_on
 from planners.stop_check import verify
 
@@ -98,7 +98,7 @@ def guard(query, rollout, envelope, candidates, scratch):
         row = query.rows[n]
         vessel, s = pointer(row), state_of(pointer(row))
         lane = of_row(whole, _keep_near(query.spheres[n], s, whole.obstacles), pointer(query.conditions[n]))
-        margins = query.margin, clearance_left(vessel, lane, radius), query.room, wall_near(vessel, world), query.drift
+        margins = query.margin, clearance_left(vessel, lane, radius), query.room, from_walls(world, s), query.drift
         tube = pointer(query.tube[place_of(s.z)])
         goal, eye = view(row.goal, 0, Point), view(query.eyes[n], 0, Point)
         around = (lane, goal, eye, world, limits, radius)

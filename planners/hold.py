@@ -12,13 +12,14 @@ from hydrone_gym.physics.trigonometry import sincos
 from hydrone_gym.simulation.storage import VESSEL
 from hydrone_gym.surface import is_air
 from planners.check import AIR_GATE, WATER_GATE, careless, copy_vessel, inside, single, state_of
-from planners.stop_check import COMMITTED, LOOK_AHEAD, can_hover, gets_away, rests
+from planners.stop_check import COMMITTED, LOOK_AHEAD, can_hover, gets_away, rests, room_after
 
 HELD = -1  # what was verified last goes on
 RETREAT = -2  # nor is that safe any more: the vehicle turns under water and swims against its drift
 _RETREAT_AHEAD = 10.0  # s that a retreat is simulated for: a quarter turn takes five
 _RETREAT = 1.0  # m against the drift: beyond the hold radius, within which nobody drives
 _TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)  # rad from the direction against the drift, tried in this order
+_BETTER = 0.1  # m farther from everything: worth a change of mind
 _AFLOAT = 0.3  # m/s sideways: who is faster does not get under water, and climbs out again
 
 
@@ -80,7 +81,8 @@ def goes_on(check, vessel, held):
         return HELD, held
     near = careless(check)
     if check.lane.weathered > 0:
-        away_safely, away = gets_away(near, vessel, held, LOOK_AHEAD, 0.0)
+        room = room_after(near, vessel, held, 0.0) + _BETTER  # who changes its mind stays where it is
+        away_safely, away = gets_away(near, vessel, held, room, 0.0)
         if away_safely:
             return RETREAT, away
     scale = -_RETREAT / max(np.sqrt(s.vx * s.vx + s.vy * s.vy), 1e-9)

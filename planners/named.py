@@ -17,9 +17,9 @@ def level_of(env: Any) -> int:
     return LEVELS.index(weather) if weather in LEVELS else _UNNAMED
 
 
-def clrrt_weather(env: Any, seed: int = 0) -> CLRRT:
-    """Return the CL-RRT that is ready for an environment's level of weather."""
-    return CLRRT.for_env(env, level=level_of(env), seed=seed)
+def clrrt_weather(env: Any, seed: int = 0, **given: Any) -> CLRRT:
+    """Return the CL-RRT that is ready for an environment's level of weather, with other arguments of it as given."""
+    return CLRRT.for_env(env, level=level_of(env), seed=seed, **given)
 
 
 def straight_line_shield(env: Any) -> Shield:
@@ -27,6 +27,6 @@ def straight_line_shield(env: Any) -> Shield:
     return Shield.for_env(StraightLine.for_env(env), env)
 
 
-def weather_shield(policy: Any, env: Any) -> Shield:
-    """Return any policy behind a shield that is ready for an environment's level of weather."""
-    return Shield.for_env(policy, env, level=level_of(env))
+def weather_shield(policy: Any, env: Any, **given: Any) -> Shield:
+    """Return any policy behind a shield that is ready for an environment's weather, other arguments as given."""
+    return Shield.for_env(policy, env, level=level_of(env), **given)

@@ -36,7 +36,6 @@ from planners.clearance import clearance_between
 
 LOOK_AHEAD = 6.0  # s that a stop is simulated for: from 2 m/s in air it takes 4.5, out of the water 5.5
 _OBLIQUELY = tuple((along, turn) for turn in (0.35, -0.35, 0.8, -0.8) for along in (1.9, -1.9))  # m, rad off the bow
-_BETTER = 0.1  # m farther from the walls: worth a change of mind
 _SMOOTH = 0.5  # share of a rough crossing's speed that one may have in weather, where waves add to it
 _RISING = 0.12  # m/s through the water that a vehicle may have sideways when it begins to rise out of it
 COMMITTED = 0.4  # m from the surface: nearer, a crossing goes on
@@ -124,35 +123,36 @@ def rests(check, vessel, hover, seconds, after):
     return near >= margin_after(check, after)
 
 
-@inlined
-def _room_at(check, vessel):
-    """Distance (m) of a vehicle from the nearest wall or known obstacle."""
-    s = state_of(vessel)
+@routine
+def room_after(check, vessel, reference, after):
+    """How far (m) from the nearest wall or known obstacle a vessel comes to rest at a reference, -inf if not safely.
+
+    The vessel stays as it is.
+    """
+    spare = shifted(check.scratch, VESSEL)
+    copy_vessel(vessel, spare)
+    if not rests(check, spare, reference, LOOK_AHEAD, after):
+        return -math.inf
+    s = state_of(spare)
     clearance = clearance_between((s.x, s.y, s.z), (s.x, s.y, s.z), check.lane, 0, check.radius)
     return min(clearance, from_walls(check.world, s) - check.radius)
 
 
 @routine
-def gets_away(check, vessel, held, seconds, after):
+def gets_away(check, vessel, held, room, after):
     """Return (whether a vessel in a current gets away from where it is, the reference); the vessel stays as it is.
 
     Who turns against a current first is carried along meanwhile; obliquely to it full thrust takes effect at once. Of
-    the ways that are safe it takes the one that ends farthest from everything, and the one it is on if none is better
-    by much: who changes its mind stays where it is.
+    the ways that are safe it takes the one that ends farthest from everything, and what it holds unless one ends
+    farther than `room` (m), -inf if that is not safe.
     """
-    s, spare = state_of(vessel), shifted(check.scratch, VESSEL)
-    best, farthest = held, -math.inf
-    copy_vessel(vessel, spare)
-    if rests(check, spare, held, seconds, after):
-        farthest = _room_at(check, spare) + _BETTER
+    s, best, farthest = state_of(vessel), held, room
     for along, turn in _OBLIQUELY:
         sine, cosine = sincos(s.psi + turn)
         x, y, z = inside(check, s.x + along * cosine, s.y + along * sine, min(s.z, -WATER_GATE))
         away = single(x, y, z, s.psi)
-        copy_vessel(vessel, spare)
-        if rests(check, spare, away, seconds, after):
-            room = _room_at(check, spare)
-            best, farthest = (away, room) if room > farthest else (best, farthest)
+        there = room_after(check, vessel, away, after)
+        best, farthest = (away, there) if there > farthest else (best, farthest)
     return farthest > -math.inf, best
 
 
@@ -164,7 +164,7 @@ def can_hover(check, vessel, after):
     if rests(check, spare, hover, LOOK_AHEAD, after):
         return True, hover
     if check.lane.weathered > 0 and not is_air(state_of(vessel).z):
-        return gets_away(check, vessel, hover, LOOK_AHEAD, after)
+        return gets_away(check, vessel, hover, -math.inf, after)
     return False, hover
 
 
@@ -218,4 +218,4 @@ def verify(check, vessel, reference):
     return can_stop(check, end, check.period)
 
 
-__all__ = ["Check", "can_hover", "can_stop", "follow", "gets_away", "rests", "verify"]
+__all__ = ["Check", "can_hover", "can_stop", "follow", "gets_away", "rests", "room_after", "verify"]

@@ -98,7 +98,7 @@ def _messages(flight: Flown, simulation: Simulation, trees: Sequence[Tree]) -> I
         tick = len(now.ticks) - 1
         period, within = divmod(tick, simulation.ticks)
         time = round(_SECOND * float(flight.trace.times[tick]))
-        stamp = f"1970-01-01T00:{time // (60 * _SECOND):02d}:{time / _SECOND % 60:012.9f}Z"
+        stamp = f"{np.datetime64(time, 'ns')}Z"
         for topic, message in _moving(now):
             yield time, topic, message if topic in _TIMELESS else {"timestamp": stamp, **message}
         entities = [] if before else [*_standing(now, simulation)]

@@ -22,12 +22,12 @@ from planners.check import (
     Check,
     clearance_left,
     copy_vessel,
+    from_walls,
     near_walls,
     place_of,
     reference_of,
     sensed,
     state_of,
-    wall_near,
 )
 from planners.cl_rrt.edge import BLOCKED, adopt, edge, left_to_go
 from planners.cl_rrt.expand import expand_tree
@@ -256,7 +256,7 @@ def planner_of(work, query, constants):
         min(settings.margin, settings.rest_margin),
         left,
         settings.room,
-        wall_near(vessel, world),
+        from_walls(world, state_of(vessel)),
         settings.drift,
         pointer(constants.tube[place_of(state_of(vessel).z)]),
         query.since,

@@ -183,18 +183,8 @@ def test_a_folder_in_use_gives_2_at_once_and_a_killed_run_leaves_it_free(tmp_pat
 def test_an_edited_policy_is_told_and_flown_anew(tmp_path, capsys):
     file = tmp_path / "climber.py"
     file.write_text(THIRD_PARTY)
-    command = [
-        "evaluate",
-        *PAPER,
-        "--policies",
-        "straight-line",
-        f"climber={file}:OverTheTop",
-        "--worlds",
-        "2",
-        "--jobs",
-        "1",
-    ]
-    command += ["--out", str(tmp_path / "out"), "--json"]
+    command = ["evaluate", *PAPER, "--policies", "straight-line", f"climber={file}:OverTheTop", "--worlds", "2"]
+    command += ["--jobs", "1", "--out", str(tmp_path / "out"), "--json"]
     assert cli.main(command) == 0
     out, err = capsys.readouterr()
     assert remarks(err) == []
@@ -264,17 +254,8 @@ def test_a_failing_policy_gives_1_and_names_the_flight(tmp_path, capsys):
     (tmp_path / "leaky.py").write_text(
         "class Leaky:\n  def __init__(self, env):\n    pass\n  predict = None.__init__\n"
     )
-    options = [
-        *PAPER,
-        "--policies",
-        "straight-line",
-        f"leaky={tmp_path / 'leaky.py'}:Leaky",
-        "--jobs",
-        "1",
-        "--worlds",
-        "2",
-    ]
-    assert cli.main(["evaluate", *options, "--out", str(tmp_path / "out")]) == 1
+    options = [*PAPER, "--policies", "straight-line", f"leaky={tmp_path / 'leaky.py'}:Leaky", "--worlds", "2"]
+    assert cli.main(["evaluate", *options, "--jobs", "1", "--out", str(tmp_path / "out")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "policy 'leaky' failed in suite paper-20-v1, mission air-to-water, world 0: " in line
     assert "2 of 8 flights are finished and kept in" in line

@@ -34,9 +34,7 @@ class Recording:
             reader = make_reader(stream, decoder_factories=[DecoderFactory()])  # by the schemas in the file
             for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
                 assert (schema.encoding, channel.message_encoding) == ("protobuf", "protobuf")
-                told = MessageToDict(
-                    decoded, preserving_proto_field_name=True, always_print_fields_with_no_presence=True
-                )
+                told = MessageToDict(decoded, **PLAIN)
                 self.topics.setdefault(channel.topic, []).append((message.log_time, told))
                 self.names[channel.topic] = schema.name
             ((self.metadata),) = [record.metadata for record in reader.iter_metadata()]
